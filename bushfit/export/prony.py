@@ -70,8 +70,8 @@ def prony_series(request: ExportRequest) -> list[PronySeries]:
         request: model, predictions and settings.
 
     Returns:
-        Series by ascending amplitude, as short as the accuracy permits, or the closest: positive terms cannot follow
-        friction, whose loss and storage modulus are both independent of frequency.
+        Series by ascending amplitude, each with the fewest terms that reach the accuracy. If no number of terms does,
+        the closest series: positive terms cannot follow friction, whose moduli are independent of frequency.
 
     Raises:
         ModelError: the model has no long-term modulus.

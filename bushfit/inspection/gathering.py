@@ -49,6 +49,7 @@ class TestSource:
     of_book: Labels = NO_LABELS
 
     def __str__(self) -> str:
+        """File, and name of its sheet, for sentences."""
         return f"{self.file}, {word_for_part(self.file)} {self.sheet}" if self.sheet else str(self.file)
 
     def without(self, *keys: str) -> "TestSource":

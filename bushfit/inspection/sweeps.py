@@ -129,8 +129,8 @@ def odd_levels(sweep: Sweep, points: pd.DataFrame) -> Iterator[str]:
         points: table of its points.
 
     Returns:
-        A sentence on amplitudes at one frequency that are too close for separate levels and not numbered as repeats;
-        and a sentence on the point whose reached amplitude is farthest from its level.
+        A sentence if two amplitudes at one frequency are so close that they may be repeats of one level, without
+        numbers in a column `repeat`; and a sentence on the point that missed its level most, if it missed it by much.
     """
     passes, of_frequency = np.unique(sweep.repeat).size, sweep.frequency.size / np.unique(sweep.frequency).size
     levels = points[["frequency", "amplitude"]].drop_duplicates().sort_values(["frequency", "amplitude"])

@@ -139,8 +139,8 @@ def _with_bounded_parameters(
 ) -> Knowledge:
     """Add the parameters at a bound to knowledge, with the covariance that they would have if they were free.
 
-    Parameters without effect on these tests are omitted. The noise exceeds the assumed noise as it does in the errors
-    of the other parameters.
+    Parameters without effect on these tests are omitted. If the residuals of the fit exceed the assumed noise, the
+    covariance is larger by the same ratio as that of the other parameters.
 
     Args:
         knowledge: knowledge of the parameters that are not at a bound.

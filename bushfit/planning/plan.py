@@ -136,7 +136,7 @@ def explain_miss(search: PlanSearch, goal: PlannedQuantity) -> str | None:
 
     Args:
         search: search with the chosen tests.
-        goal: target with its operating points.
+        goal: parameter or prediction with a target.
 
     Returns:
         Sentence; None if the tests meet the target.

@@ -191,7 +191,7 @@ class PlanSearch:
         """Warning that no test in a target's direction shows the error of its stiffness formula.
 
         Args:
-            goal: target with its operating points.
+            goal: parameter or prediction with a target.
             counts: number of runs of each test in addition to the tests so far, (tests,).
 
         Returns:
