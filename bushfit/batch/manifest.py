@@ -235,8 +235,8 @@ def read_csv_entries(path: Path) -> list[Entry]:
         place, counts = f"line {number}", {"found": str(len(cells)), "expected": str(len(header))}
         if len(cells) > len(header):
             raise CampaignError("more cells than columns", file=path, place=place, **counts)
-        stated = {key: cell for key, cell in zip(header, cells, strict=False) if cell}
-        entries.append(validate_tables(stated, path, Entry, place=place))
+        settings = {key: cell for key, cell in zip(header, cells, strict=False) if cell}
+        entries.append(validate_tables(settings, path, Entry, place=place))
     return entries
 
 

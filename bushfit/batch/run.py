@@ -119,7 +119,11 @@ def remove_unlisted_parts(plan: BatchPlan) -> list[str]:
 
 
 def batch_files(result: BatchResult) -> list[ResultFile]:
-    """Document, table, and page and figure of the whole batch, if the formats include them; not yet written."""
+    """Collect the result files of the whole batch, not yet written.
+
+    Returns:
+        Document, table, and page and figure if the formats include them.
+    """
     from bushfit.report.page.index import index_page
 
     formats, document = result.plan.formats, result.document

@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
@@ -88,8 +89,8 @@ class BatchResult:
         """
         names, unknown = dict.fromkeys(name for record in self.records for name in record.quantities), Estimate(np.nan)
         estimates = {name: [record.quantities.get(name, unknown) for record in self.records] for name in names}
-        rows = {name: [(one.value, one.low, one.high, one.stderr) for one in of] for name, of in estimates.items()}
-        return {name: np.array(row, dtype=float).T for name, row in rows.items()}
+        numbers = attrgetter("value", "low", "high", "stderr")
+        return {name: np.array([*map(numbers, parts)], dtype=float).T for name, parts in estimates.items()}
 
     @cached_property
     def is_poor(self) -> Array:

@@ -71,7 +71,7 @@ def comparison_page(comparison: ComparisonDocument, chart: ResultFile | None = N
         "document": document,
         "names": names,
         "resisted": "modulus"
-        if all(of[0].stiffness.startswith("modulus") for of in differences.values())
+        if all(results[0].stiffness.startswith("modulus") for results in differences.values())
         else "stiffness",
         "title": title,
         "entries": entries,
