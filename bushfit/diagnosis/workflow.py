@@ -116,7 +116,7 @@ def _initial_fit(
     """
     hint = "add measured tests to the campaign"
     data_sets = data.require_tests(data.data_sets, "there is nothing to diagnose", hint)
-    start = data.start_values(data_sets, {})
+    start = data.start_values(data_sets)
     model = replace(model or data.starting_model(data.effects, data_sets, {}), constraints=data.constraints)
     start = {name: value for name, value in start.items() if name in model.values and name not in fixed}
     for name in settings.adopt:

@@ -296,7 +296,7 @@ def _runs(test: MeasuredTest) -> Iterator[tuple[dict[str, Any], Array]]:
     if not isinstance(test, MeasuredSweep) or test.sweep.stepped is None:
         yield {}, np.ones(test.frequency.size, dtype=bool)
         return
-    held = "amplitude" if test.sweep.stepped == "frequency" else "frequency"
-    unit = test.direction.motion.displacement_unit if held == "amplitude" else "Hz"
+    quantity = "amplitude" if test.sweep.stepped == "frequency" else "frequency"
+    unit = test.direction.motion.displacement_unit if quantity == "amplitude" else "Hz"
     for value in np.unique(test.held_value):
-        yield {"held": held, "value": float(value), "unit": unit}, test.held_value == value
+        yield {"held": quantity, "value": float(value), "unit": unit}, test.held_value == value

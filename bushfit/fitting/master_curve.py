@@ -82,6 +82,7 @@ def shift_factors(result: Result, temperature: Array) -> tuple[Array, Array]:
     step = _APART * (error or np.nan)
 
     def shift(shift_value: float) -> Array:
+        """Natural log of the shift factors at the temperatures, for one value of the shift parameter, (n,)."""
         return np.log(result.model.with_values({SHIFT: shift_value}).shift_factor(RubberConditions(temperature)))
 
     slope = (shift(value + step) - shift(value - step)) / (2.0 * step) if error else np.full(temperature.shape, np.nan)

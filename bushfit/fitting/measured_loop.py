@@ -58,6 +58,7 @@ class MeasuredLoop(MeasuredBase):
 
     @property
     def test(self) -> Loop:
+        """Measured loop as read from the file, reduced to its steady cycles."""
         return self.prepared.loop
 
     @property
@@ -109,6 +110,7 @@ class MeasuredLoop(MeasuredBase):
 
     @property
     def weights(self) -> Array:
+        """Weight of each row, (n,): 1 full, 0 left out; of a long loop the number of rows averaged in each bin."""
         return self.prepared.weight
 
     @property
@@ -121,11 +123,8 @@ class MeasuredLoop(MeasuredBase):
         return replace(self, prepared=replace(self.prepared, weight=self.prepared.weight * weight))
 
     def fundamental(self) -> Self:
+        """Return the loop compared by the first harmonic of its force only."""
         return replace(self, fundamental_only=True)
-
-    def with_noise(self, relative: float) -> Self:
-        """Return the loop with another standard deviation of the noise of a row, relative to half the force range."""
-        return replace(self, prepared=replace(self.prepared, noise=relative * self.prepared.half_range))
 
     def with_model_error(self, size: float) -> Self:
         """Return the loop with this standard deviation of the model error, relative to half the force range."""
@@ -148,19 +147,32 @@ class MeasuredLoop(MeasuredBase):
         return force if values is not None else self._keep("force", model, (), force)
 
     def residual(self, model: Model, values: Values | None = None, added: Array | None = None) -> Array:
+        """Whitened residuals: model minus measured force in units of noise.
+
+        Args:
+            model: model to evaluate.
+            values: parameter values in place of the model's; leading axes are added to the result.
+            added: stiffness added to the model's in the first harmonic, complex (1,) [N/m or N m/rad].
+
+        Returns:
+            Residuals, (..., size).
+        """
         rows = self.whiten((self.force(model, values) - self.prepared.force) * self._per_noise)
         return rows if added is None else rows + self.residual_change(added, model)
 
     def jacobian(
         self, model: Model, names: Sequence[str], added: Array | None = None, *, as_share: bool = False
     ) -> Array:
-        """Derivatives of the whitened residuals by parameter value [SI], (len(names), size); the last are cached.
+        """Derivatives of the whitened residuals by parameter value [SI]; the last are cached.
 
         Args:
             model: model at whose values the derivatives are taken.
             names: names of the parameters.
             added: stiffness added to the model's at each operating point (one in a loop), complex [N/m or N m/rad].
             as_share: True if the added stiffness remains proportional to the model's; False if it is constant.
+
+        Returns:
+            Derivatives per SI unit of each parameter, (len(names), size).
         """
         if (rows := self._recall("jacobian", model, tuple(names))) is None:
             history = self.prepared.history(model.is_transient)
@@ -183,9 +195,12 @@ class MeasuredLoop(MeasuredBase):
             model: model whose stiffness changes.
             added: stiffness added to the model's at the same points, complex [N/m or N m/rad]; a loop does not use it.
         """
-        return np.concatenate((change.real, change.imag), axis=-1) @ self._unit_changes
+        wave = self.prepared.coefficients[1] * np.exp(2j * np.pi * self.prepared.phase)
+        per_unit = self.whiten(np.array([wave.real, -wave.imag]) * self._per_noise)
+        return np.concatenate((change.real, change.imag), axis=-1) @ per_unit
 
     def relative_difference(self, model: Model) -> Array:
+        """Model minus measured force at each row, relative to half the measured force range, (1, n)."""
         return ((self.force(model) - self.prepared.force) / self.prepared.half_range)[None]
 
     def relative(self, model: Model) -> Array:
@@ -221,8 +236,7 @@ class MeasuredLoop(MeasuredBase):
     def smooth_changes(self) -> Array:
         """Change of the whitened residuals by 11 smooth changes of the force, each of half the force range, (11, size).
 
-        These are a constant, and cosine and sine of five harmonics; with `fundamental_only` all but the first harmonic
-        are 0.
+        These are a constant, and cosine and sine of five harmonics; with `fundamental_only` only the first is not 0.
         """
         rows = self.force_changes(self._waves)
         if self.fundamental_only:
@@ -297,12 +311,6 @@ class MeasuredLoop(MeasuredBase):
         return np.linalg.qr(waves.T)[0]
 
     @cached_property
-    def _unit_changes(self) -> Array:
-        """Change of the whitened residuals per real and per imaginary unit of stiffness [N/m or N m/rad], (2, size)."""
-        wave = self.prepared.coefficients[1] * np.exp(2j * np.pi * self.prepared.phase)
-        return self.whiten(np.array([wave.real, -wave.imag]) * self._per_noise)
-
-    @cached_property
     def _unit_offset(self) -> Array:
         """Change of the whitened rows if half the force range is added to the force of every row, (size,)."""
         return self._whiten_rows(self._per_noise * self.prepared.half_range)
@@ -355,16 +363,7 @@ class MeasuredLoop(MeasuredBase):
         return CommonError(self._error_waves[2 * (self.first_error - 1) :])
 
     def error_products(self, model: Model, names: Sequence[str]) -> tuple[Array, Array, Array]:
-        """Compute what determines the size of a model error: the residuals and their k derivatives in units of noise.
-
-        Args:
-            model: model at whose values residuals and derivatives are taken.
-            names: names of the k parameters.
-
-        Returns:
-            Inner products of these m = k + 1 rows, (m, m); their components along the c independent directions of the
-            model error, (m, c); and the variance along each direction if the error has size 1, (c,).
-        """
+        """Inner products that determine the size of a model error; see `Whitening.error_products`."""
         bare = replace(self, gain_error=0.0, model_error=0.0)
         white = np.vstack((self._whiten_rows(self.misfit(model)), bare.jacobian(model, names)))
         directions, size = self._unit_error.principal_errors
@@ -393,11 +392,8 @@ class MeasuredLoop(MeasuredBase):
     def extra_covariance(self, influence: Array) -> Array:
         """Covariance, (k, k), of k parameter estimates by errors that the weights of the residuals do not include.
 
-        For a loop with model error, the covariance by the gain error is added, and that by the model error of the first
-        harmonic is subtracted, because the Gaussian process of the model error includes it.
-
-        Args:
-            influence: change of each estimate by a unit of each whitened residual, (k, size).
+        The gain error is added, and the model error of the first harmonic, which a Gaussian process includes, subtracted.
+        `influence`: change of each estimate by a unit of each whitened residual, (k, size).
         """
         first = influence @ self._whiten_shared(self.model_error * self._error_waves[:2]).T
         gain = influence @ self._whiten_shared(self.gain_error * self._unit_gain)

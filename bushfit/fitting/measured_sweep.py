@@ -84,6 +84,7 @@ class MeasuredSweep(MeasuredBase):
 
     @property
     def test(self) -> Sweep:
+        """Measured sweep as read from the file."""
         return self.sweep
 
     @cached_property
@@ -115,28 +116,35 @@ class MeasuredSweep(MeasuredBase):
 
     @property
     def size(self) -> int:
+        """Number of residuals of the sweep: gain and phase of each of the n points."""
         return 2 * int(self.order.size)
 
     @property
     def residual_count(self) -> int:
+        """Number of residuals of points with weight, for degrees of freedom."""
         return 2 * int(np.count_nonzero(self.weights))
 
     @property
     def independent_count(self) -> float:
+        """Number of independent residuals, which sets the uncertainty of a mean over the sweep."""
         return float(self.residual_count)
 
     @property
     def relative_noise(self) -> float:
+        """Standard deviation of a point relative to |K|, root mean square over gain and phase of all lines."""
         return float(np.sqrt(np.mean(np.square(list(self.noise.random.values())))))
 
     @cached_property
     def weights(self) -> Array:
+        """Weight of each point, 0 (left out) to 1, (n,)."""
         return np.ones(self.frequency.size) if self.weight is None else self.weight
 
     def weighted(self, weight: Array) -> Self:
+        """Return the sweep with the weight of each of its n points multiplied by a factor, (n,)."""
         return replace(self, weight=self.weights * weight)
 
     def without(self, points: Array) -> Self:
+        """Return the sweep with weight 0 at the points with the given indices."""
         return self.weighted(np.isin(np.arange(self.frequency.size), points, invert=True)) if points.size else self
 
     def select(self, points: Array) -> Self:
@@ -144,19 +152,23 @@ class MeasuredSweep(MeasuredBase):
         return replace(self, weight=self.weights[points], part=self.order[points])
 
     def with_weight(self) -> Self:
+        """Return the sweep with only those points that have weight."""
         weighed = self.weights > 0.0
         return self if weighed.all() else self.select(weighed)
 
     def with_model_error(self, size: float) -> Self:
+        """Return the sweep with this standard deviation of the relative model error of an operating point."""
         return replace(self, model_error=size)
 
     def noise_free(self, model: Model) -> Self:
+        """Return the sweep with the stiffness of a model in place of the measured stiffness."""
         stiffness = self.sweep.stiffness.copy()
         stiffness[self.order] = self.stiffness(model)
         return replace(self, sweep=replace(self.sweep, stiffness=stiffness))
 
     @cached_property
     def conditions(self) -> RubberConditions:
+        """Temperature of the rubber and its earlier strains at each of the n points."""
         return self.test_conditions.select(self.order)
 
     @cached_property
@@ -208,6 +220,16 @@ class MeasuredSweep(MeasuredBase):
         return stiffness if values is not None else self._keep("stiffness", model, (), stiffness)
 
     def residual(self, model: Model, values: Values | None = None, added: Array | None = None) -> Array:
+        """Whitened residuals: model minus measured in units of noise.
+
+        Args:
+            model: model to evaluate.
+            values: parameter values in place of the model's; leading axes are added to the result.
+            added: stiffness added to the model's at each point, complex (n,) [N/m or N m/rad].
+
+        Returns:
+            Residuals, (..., 2 n): n gains, then n phases.
+        """
         stiffness = self.stiffness(model, values)
         with np.errstate(divide="ignore", invalid="ignore"):  # not finite where there is no stiffness: within free play
             return self.whiten(self.deviation(stiffness if added is None else stiffness + added))
@@ -215,6 +237,17 @@ class MeasuredSweep(MeasuredBase):
     def jacobian(
         self, model: Model, names: Sequence[str], added: Array | None = None, *, as_share: bool = False
     ) -> Array:
+        """Derivatives of the whitened residuals by parameter value [SI]; the last are cached.
+
+        Args:
+            model: model at whose values the derivatives are taken.
+            names: names of the k parameters.
+            added: stiffness added to the model's at each point, complex (n,) [N/m or N m/rad].
+            as_share: True if the added stiffness remains proportional to the model's; False if it is constant.
+
+        Returns:
+            Derivatives, (k, 2 n): n gains, then n phases.
+        """
         if added is None and (rows := self._recall("jacobian", model, tuple(names))) is not None:
             return rows
         frequency, amplitude, conditions, distinct_index = self._operating_points(model)
@@ -294,21 +327,26 @@ class MeasuredSweep(MeasuredBase):
             return self.covariance.whiten(difference)
 
     def noise_sensitivity(self, influence: Array) -> dict[Hashable, Array]:
+        """Sensitivity of k parameter estimates to the error of each estimated noise variance; see `Whitening`."""
         return self.covariance.noise_sensitivity(influence)
 
     def extra_covariance(self, influence: Array) -> Array:
+        """Covariance, (k, k), of k estimates by errors that the weights do not include beside a model error."""
         return self.covariance.extra_covariance(influence)
 
     @property
     def log_det_covariance(self) -> float:
+        """Natural log of the determinant of the residuals' covariance with model error; 0 without one."""
         return self.covariance.log_det_covariance if self.model_error else 0.0
 
     def error_products(self, model: Model, names: Sequence[str]) -> tuple[Array, Array, Array]:
+        """Inner products that determine the size of a model error; see `Whitening.error_products`."""
         bare = replace(self, noise=replace(self.noise, shared=(0.0, 0.0), level=(0.0, 0.0)), model_error=0.0)
         slopes = bare.jacobian(model, names)  # which keeps the response for the residuals
         return self.covariance.error_products(np.vstack((bare.residual(model), slopes)))
 
     def relative_difference(self, model: Model) -> Array:
+        """Model minus measured stiffness relative to the measured |K|: real and imaginary part, (2, n)."""
         difference = (self.stiffness(model) - self.measured) / np.abs(self.measured)
         return np.stack((difference.real, difference.imag))
 
@@ -329,16 +367,19 @@ class MeasuredSweep(MeasuredBase):
         return self.scaled_distance(self.deviation(self.stiffness(model))) / np.sqrt(2.0)
 
     def displayed_residual(self, model: Model) -> Array:
+        """Residuals for charts in units of noise, (2 n,): whitened; in units of scatter at points without weight."""
         deviation = self.deviation(self.stiffness(model))
         distances = self.covariance.scaled(deviation).ravel()
         return np.where(np.tile(self.weights > 0.0, 2), self.whiten(deviation), distances)
 
     def outlier_indices(self, model: Model) -> Array:
+        """Indices of the points that are farther from the model and from their neighbours than noise explains, (k,)."""
         points, freedom = np.stack((self.frequency, self.amplitude)), self.noise.scatter_freedom or np.inf
         deviation = self.deviation(self.stiffness(model))
         return outlying_points(deviation, self.scaled_distance, self.block_starts, points, freedom)
 
     def outliers(self, points: Array, model: Model) -> Iterator[Outlier]:
+        """Yield file, row and distance from the model of the outliers with the indices `points`."""
         file = str(self.source.file) if self.source else None
         distance = self.distance(model)[points].tolist()
         for row, noise_units in sorted(zip((self.order[points] + 1).tolist(), distance, strict=True)):
@@ -353,5 +394,6 @@ class MeasuredSweep(MeasuredBase):
         return [self.whiten(unit * chosen.astype(complex)) for unit in (1.0, 1.0j)]
 
     def columns(self) -> dict[str, Any]:
+        """Table columns by header that identify each point: frequency [Hz], amplitude and repeat."""
         unit, factor = self.direction.display.displacement
         return {"frequency [Hz]": self.frequency, f"amplitude [{unit}]": self.amplitude * factor, "repeat": self.repeat}

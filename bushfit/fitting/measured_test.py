@@ -83,10 +83,12 @@ class MeasuredBase(ABC):
 
     @property
     def name(self) -> str:
+        """Name of the test in tables and messages."""
         return self.test.name
 
     @property
     def direction(self) -> Place:
+        """Direction or specimen of the test."""
         return self.test.direction
 
     @property

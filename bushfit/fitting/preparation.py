@@ -139,7 +139,7 @@ def with_level_errors(tests: Sequence[MeasuredTest], error: tuple[float, float],
     """Return tests with other gain and phase errors that all runs of a level of a sweep share; loops have none.
 
     Args:
-        tests: tests, of which only sweeps change.
+        tests: loops, which are unchanged, and sweeps.
         error: standard deviation of gain and of phase [rad].
         freedom: degrees of freedom behind the error; 0 if it is exact.
     """
@@ -221,7 +221,8 @@ def planned_loop(
         coefficients=np.array([0.0, -1j * amplitude]),
         half_range=1.0,
     )
-    return MeasuredLoop(silent).noise_free(model).with_noise(noise)
+    loop = MeasuredLoop(silent).noise_free(model)
+    return replace(loop, prepared=replace(loop.prepared, noise=noise * loop.prepared.half_range))
 
 
 def planned_sweep(

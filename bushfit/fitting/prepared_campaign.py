@@ -159,10 +159,10 @@ class PreparedCampaign:
         settings = self.campaign.fit.parameters
         return {name: setting.value for name, setting in settings.items() if setting.value is not None}
 
-    def start_values(self, data_sets: Sequence[MeasuredTest], fixed: Mapping[str, float]) -> dict[str, float]:
-        """Start values of the paper's parameters [SI] by name: fixed, else as in the campaign, else from the tests."""
+    def start_values(self, data_sets: Sequence[MeasuredTest]) -> dict[str, float]:
+        """Start values of the paper's parameters [SI] by name: those of [fit], else estimates from the tests."""
         with error_location(self.campaign.path):
-            return start_values(self.campaign.bushing, data_sets, {**self.given_values, **fixed})
+            return start_values(self.campaign.bushing, data_sets, self.given_values)
 
     def starting_model(
         self, effects: Sequence[str], data_sets: Sequence[MeasuredTest], stage_fixed: Mapping[str, float]

@@ -211,6 +211,7 @@ def fit_two_step(data: PreparedCampaign) -> TwoStep:
 
 @lru_cache(maxsize=1)  # the static fit, and the first pass of the two steps
 def _fit_without_springpot(data: PreparedCampaign) -> FitResult:
+    """Fit mu, sigma_fmax and eps_half to the loops by a model without the springpot."""
     return _fit_step(data, data.static_loops(), ("elastic", "friction"), {})
 
 
@@ -307,6 +308,9 @@ def build_result(
         unused: tests that no fit used, which the model is compared with.
         bounded_is_fixed: True to treat a parameter at a bound as fixed even if the model meets the tests.
         advice: text to append to the sentence on a misfit.
+
+    Returns:
+        The model with covariance, quality, measured range, misfit of each test, and warnings.
     """
     last = steps[-1]
     model, tests = model or last.model, [test for step in steps for test in step.data_sets]

@@ -31,10 +31,11 @@ def solve_with_lmfit(problem: FitProblem) -> FitResult:
         Result at the minimum.
 
     Raises:
-        FitError: see `Descent`, which replaces MINPACK if a step leaves the bounds or the fit does not converge.
+        FitError: there are fewer data than parameters, or the response of the model is not finite.
 
     Notes:
-        Both methods find the same minimum: on the campaigns in configs/ and data/practice parameters differ by 1e-8.
+        If a step leaves the bounds or MINPACK does not converge, `Descent` replaces it. Both methods find the same
+        minimum: on the campaigns in configs/ and data/practice parameters differ by 1e-8.
         All other fits use `Descent`, which needs 0.4 to 0.9 of the time and supports bounds.
     """
     if not problem.names:

@@ -119,7 +119,15 @@ class Whitening:
         return added
 
     def error_products(self, rows: Array) -> tuple[Array, Array, Array]:
-        """Inner products of deviations in units of scatter, (m, 2 n), as `MeasuredLoop.error_products` returns them."""
+        """Compute what determines the size of a model error.
+
+        Args:
+            rows: residuals of a model, and their derivatives by its k parameters, in units of the scatter, (m, 2 n).
+
+        Returns:
+            Inner products of these m = k + 1 rows, (m, m); their components along the c independent directions of the
+            model error, (m, c); and the variance along each direction if the error has size 1, (c,).
+        """
         order, starts = self._by_point
         components = np.add.reduceat((rows * self._block.unit)[:, order], starts, axis=-1)
         return rows @ rows.T, components, self._point.weight

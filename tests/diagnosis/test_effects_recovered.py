@@ -111,7 +111,7 @@ def begun(model: Model, campaign: Campaign) -> tuple[Model, list[MeasuredTest]]:
     """The plain model as a fit begins, and the tests."""
     data = PreparedCampaign.from_campaign(campaign)
     tests = [*data.loops, *data.sweeps]
-    return Model.with_defaults(model.bushing, BASE, data.start_values(tests, {})), tests
+    return Model.with_defaults(model.bushing, BASE, data.start_values(tests)), tests
 
 
 def families(model: Model, truth: str, values: Mapping[str, float]) -> dict[str, FittedFamily]:
