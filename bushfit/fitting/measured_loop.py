@@ -392,7 +392,7 @@ class MeasuredLoop(MeasuredBase):
     def extra_covariance(self, influence: Array) -> Array:
         """Covariance, (k, k), of k parameter estimates by errors that the weights of the residuals do not include.
 
-        The gain error is added. The model error of the first harmonic, which a Gaussian process includes, is subtracted.
+        The gain error is added. The model error of the first harmonic, which a smooth error includes, is subtracted.
         `influence`: change of each estimate by a unit of each whitened residual, (k, size).
         """
         first = influence @ self._whiten_shared(self.model_error * self._error_waves[:2]).T
