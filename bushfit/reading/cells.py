@@ -156,6 +156,12 @@ class Cells:
                 return "doubtful" if not is_word else "missing" if word in _MISSING else "word"
         return None
 
+    @cached_property
+    def first_decimal(self) -> str | None:
+        """Decimal mark of the first thousand numbers; None if they leave it open."""
+        ways = consistent_notations(islice(self.number_texts(), _FIRST), self.possible_numerals()).ways
+        return ways[0].decimal if len({way.decimal for way in ways}) == 1 else None
+
     def parse(self, block: RowSource, indices: frozenset[int]) -> Mapping[int, Floats] | None:
         """Read columns of a block at once, in units of the file.
 
@@ -176,12 +182,13 @@ class Cells:
         if isinstance(block, Channels) and block.numeric >= indices:
             return {index: block.arrays[index] for index in indices}
         first = list(map(str, self.first_row))
-        if not isinstance(block, Text) or not indices or len(first) != len(self.headers) or self.numerals.thousands:
+        if not isinstance(block, Text) or not indices or len(first) != len(self.headers) or self.first_decimal is None:
             return None
-        numeric = [index for index, cell in enumerate(first) if self.numerals.allows(cell)]
+        notation = Numerals(self.first_decimal)
+        numeric = [index for index, cell in enumerate(first) if notation.allows(cell)]
         if not indices <= {*numeric}:
             return None  # pandas takes TRUE for 1
-        frame = block.frame(self.layout, dict.fromkeys(numeric, float), len(first), self.numerals.decimal)
+        frame = block.frame(self.layout, dict.fromkeys(numeric, float), len(first), notation.decimal)
         words = block.first_words(self.layout.delimiter) if numeric[0] else ()
         if frame is None or any(is_summary_row([word]) for word in words):
             return None
