@@ -194,14 +194,22 @@ class Cells:
             return None
         return {index: frame[index].to_numpy() for index in indices}
 
-    def texts(self, block: RowSource, index: int) -> NDArray[np.object_]:
-        """Return the cells of a column, texts or numbers, in the rows of data of a block, (n,)."""
+    def texts(self, block: RowSource, indices: Sequence[int]) -> Iterator[tuple[NDArray[Any], NDArray[Any]]]:
+        """Find the distinct cells of columns, texts or numbers, in a block of rows.
+
+        Yields:
+            For each column, the index among its distinct cells of each of the n rows of data, (n,), and these cells.
+        """
+        import pandas as pd
+
         if isinstance(block, Text) and self.layout.delimiter != " " and not self.marks and b'"' not in block.data:
-            is_clean = self.parse(block, self.needed) is not None
-            frame = block.frame(self.layout, {index: "category"}, len(self.headers), ".") if is_clean else None
+            is_clean, types = self.parse(block, self.needed) is not None, dict.fromkeys(indices, "category")
+            frame = block.frame(self.layout, types, len(self.headers), ".") if is_clean else None
             if frame is not None:
-                return np.asarray(frame[index], dtype=object)
-        return np.array([row[index] for _, row in self.rows(block)], dtype=object)
+                yield from (frame[index].factorize() for index in indices)
+                return
+        rows = [row for _, row in self.rows(block)]
+        yield from (pd.factorize(np.array([row[index] for row in rows], dtype=object)) for index in indices)
 
     def note_left_out(self, rows: Sequence[FaultyRow], count: int) -> Iterator[str]:
         """Describe rows that are left out because they are not data, except headers and units that are repeated.

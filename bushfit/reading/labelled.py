@@ -50,16 +50,23 @@ def same_text(text: str, reference: str) -> bool:
     return text.strip(" #").casefold() == reference.strip(" #").casefold()
 
 
-def column_texts(cells: Cells, index: int) -> ColumnTexts:
-    """Return the texts of the column with this index; an empty or merged cell has the text of the cell above."""
-    import pandas as pd
+def column_texts(cells: Cells, *indices: int) -> Iterator[ColumnTexts]:
+    """Find the texts of columns; an empty or merged cell has the text of the cell above.
 
-    codes, distinct = pd.factorize(np.concatenate([cells.texts(block, index) for block in cells.blocks()]))
-    numbers, texts = pd.factorize(np.array([_text(cell).strip(" #") for cell in distinct], dtype=object))
-    codes = numbers[codes]
-    is_empty = codes == next((number for number, text in enumerate(texts) if text == ""), -1)
-    codes = codes[np.maximum.accumulate(np.where(is_empty, 0, np.arange(codes.size)))]
-    return ColumnTexts(list(texts), codes)
+    Yields:
+        Texts of the column with each index.
+    """
+    blocks = [list(cells.texts(block, indices)) for block in cells.blocks()] if indices else []
+    for column in zip(*blocks, strict=True):
+        number_by_text, parts = dict[str, int](), list[NDArray[np.intp]]()
+        for rows, distinct in column:
+            texts = [_text(cell).strip(" #") for cell in distinct]
+            numbers = [number_by_text.setdefault(text, len(number_by_text)) for text in texts]
+            parts.append(np.array(numbers, dtype=np.intp)[rows])
+        codes = np.concatenate(parts)
+        is_empty = codes == number_by_text.get("", -1)
+        codes = codes[np.maximum.accumulate(np.where(is_empty, 0, np.arange(codes.size)))]
+        yield ColumnTexts(list(number_by_text), codes)
 
 
 def _text(cell: str | float) -> str:
@@ -88,7 +95,7 @@ def find_labels(cells: Cells) -> Mapping[str, tuple[int, Sequence[str]]]:
         if heading is None or heading.role in labels or (header == "block" and "displacement" not in cells.roles):
             continue
         if _may_distinguish_tests(cells, index):
-            texts = column_texts(cells, index)
+            (texts,) = column_texts(cells, index)
             if heading.role == "direction":
                 directions = [named_direction([text], short=True) for text in texts.distinct]
                 if not any(directions):
@@ -120,7 +127,7 @@ def select_rows(cells: Cells, labels: Mapping[str, tuple[int, Sequence[str]]], w
         if header not in cells.headers:
             raise cells.header_error(f'there is no column "{header}"', expected="headers, as keys of rows")
         index = cells.headers.index(header)
-        chosen.append((index, column_texts(cells, index).per_row(), text))
+        chosen.append((index, next(column_texts(cells, index)).per_row(), text))
     if wanted.shared and not chosen:
         expected = "each file once, or a column that selects the rows of each test"
         raise cells.header_error("a file is listed twice", expected=expected)
@@ -168,8 +175,8 @@ def note_not_understood(
         and (settled or not cells.holds_numbers(index))
         and _may_distinguish_tests(cells, index)
     ]
-    for index in unclear:
-        header, is_number, texts = cells.headers[index], cells.holds_numbers(index), column_texts(cells, index)
+    for index, texts in zip(unclear, column_texts(cells, *unclear), strict=True):
+        header, is_number = cells.headers[index], cells.holds_numbers(index)
         codes = texts.codes if rows is None else texts.codes[rows]
         present, number, counts = np.unique(codes, return_inverse=True, return_counts=True)
         depends_on = [settled] if is_number else [(quantity,) for quantity in settled]

@@ -246,7 +246,7 @@ def _repeat_numbers(table: Table, values: Mapping[str, Floats]) -> NDArray[np.in
         return None
     column = table.roles["repeat"]
     if "repeat" not in values:
-        return column_texts(table, column.index).codes.astype(np.int64) + 1
+        return next(column_texts(table, column.index)).codes.astype(np.int64) + 1
     repeat = values["repeat"]
     is_count = (repeat == np.round(repeat)) & (repeat >= 0) & (repeat < _MOST_REPEATS)
     table.refuse(~is_count, column, "this is not a repeat number", "a whole number")
