@@ -18,6 +18,10 @@ from bushfit.reading.source import RowSource, Sheet
 from bushfit.reading.table import Table
 from bushfit.reading.wide import unpivot
 
+_NUMBERED_COLUMNS = (
+    'columns = { time = "1", displacement = "2", force = "3" } or '
+    'columns = { frequency = "1", amplitude = "2", stiffness = "3", loss_factor = "4" }'
+)
 _EXPECTED_HEADER = 'a header row such as "time [s],displacement [mm],force [N]"'
 
 
@@ -84,10 +88,7 @@ def find_table(
         expected = f"{_EXPECTED_HEADER}, separated by comma, semicolon, tab, | or blanks"
         raise table.header_error("there is only one column", expected=expected)
     if layout.headerless and not any(text.isdecimal() for text in columns.values()):
-        tests = (("time", "displacement", "force"), ("frequency", "amplitude", "stiffness", "loss_factor"))
-        entries = [", ".join(f'{role} = "{n}"' for n, role in enumerate(test, 1)) for test in tests]
-        ways = " or ".join(f"columns = {{ {entry} }}" for entry in entries)
-        hint = f"name the columns by their numbers in the campaign, and their units: {ways}"
+        hint = f"name the columns by their numbers in the campaign, and their units: {_NUMBERED_COLUMNS}"
         raise table.header_error("there is no header", found=None, expected=_EXPECTED_HEADER, hint=hint)
     roles, notes, clocks = classify(table, names, motion, vocabulary, columns, stated_units or {})
     essential = ({"displacement", "force"}, *(set(pair) for pair in PAIRS))

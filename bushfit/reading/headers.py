@@ -108,12 +108,7 @@ _OF_MEANS = frozenset(("stiffness", "storage_stiffness", "loss_stiffness", "loss
 #: Names of an amplitude that imply peak-to-peak.
 PEAK_TO_PEAK_NAMES = frozenset(WORDS["counting"]["peak_to_peak"])
 #: Parts of the patterns of conventions: ends of words, and the end of a unit to which one may be joined ("mmpp").
-_PARTS = {
-    "start": r"(?<![^\W_])",
-    "end": r"(?![^\W_])",
-    "unit": r"(?:(?<=mm)|(?<=[uμ]m)|(?<=deg)|(?<=rad))",
-    "peak": "|".join(WORDS["conventions"]["peak"]),
-}
+_PARTS = {part: "|".join(WORDS["conventions"][part]) for part in ("start", "end", "unit", "peak")}
 #: Key in words.toml of the words for each convention, in the order in which they are tried.
 _CONVENTION_KEYS: dict[str, AmplitudeConvention] = {
     "zero_to_peak": "zero-to-peak", "peak_to_peak": "peak-to-peak", "rms": "rms", "lone_peak": "zero-to-peak"

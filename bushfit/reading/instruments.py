@@ -178,11 +178,11 @@ def _split_by_length(
     labels = [tuple(map(str, label)) for label in properties]
     for table in tables:
         over = table[0].over
-        _refuse_complex(table)
+        is_record = "time" in _REAL.roles([channel.name for channel in table])
         several = sum(np.iscomplexobj(one.values) and bool(np.any(one.values.imag)) for one in table) > 1
         if over and over.name not in _REAL.roles([one.name for one in table]):
             table.insert(0, over)
-        if columns := [column for channel in table for column in _real_channels(channel, several)]:
+        if columns := [column for channel in table for column in _real_channels(channel, several, is_record)]:
             names, arrays, unit_texts, _ = zip(*columns, strict=True)
             title = f"{name}, {len(arrays[0])} rows".strip(", ") if len(tables) > 1 else name
             header = [f"{text} [{unit}]" if unit else text for text, unit in zip(names, unit_texts, strict=True)]
@@ -192,33 +192,27 @@ def _split_by_length(
             yield Channels(title, (), layout=layout, numeric=numeric, arrays=arrays, above=above, format=recording.name)
 
 
-def _refuse_complex(channels: Sequence[Channel]) -> None:
-    """Refuse complex values that have no meaning: of a time, frequency or amplitude, or of a channel over time.
-
-    Raises:
-        MeasurementError: a channel has complex values without a meaning.
-    """
-    is_record = "time" in _REAL.roles([channel.name for channel in channels])
-    for channel in channels:
-        is_real = is_record or _REAL.heading(channel.name)
-        if is_real and np.iscomplexobj(channel.values) and np.any(channel.values.imag):
-            raise MeasurementError(
-                f'the channel "{channel.name}" holds complex numbers',
-                found=f"{channel.values[np.argmax(channel.values.imag != 0.0)]:.6g} among them",
-                expected="real numbers",
-                hint="export its real part, or leave the channel out",
-            )
-
-
-def _real_channels(channel: Channel, several: bool) -> Iterator[Channel]:
+def _real_channels(channel: Channel, several: bool, is_record: bool) -> Iterator[Channel]:
     """Convert a channel to real ones: dates to seconds, complex values to magnitude and phase.
 
-    The two are named after the channel if the file has several.
+    Args:
+        channel: channel to convert.
+        several: True if the file has several complex channels; a phase is then named after its channel.
+        is_record: True if the channels are recorded over time, so that complex values have no meaning.
+
+    Raises:
+        MeasurementError: a record, a time, a frequency or an amplitude is complex.
     """
     values = channel.values
     if values.dtype.kind == "c" and not np.any(values.imag):
         values = values.real
-        channel = channel._replace(values=values)
+    if values.dtype.kind == "c" and (is_record or _REAL.heading(channel.name)):
+        raise MeasurementError(
+            f'the channel "{channel.name}" holds complex numbers',
+            found=f"{values[np.argmax(values.imag != 0.0)]:.6g} among them",
+            expected="real numbers",
+            hint="export its real part, or leave the channel out",
+        )
     if values.dtype.kind == "c":
         yield channel._replace(values=np.abs(values))
         yield Channel(f"{channel.name} phase" if several else "phase", np.angle(values), "rad")

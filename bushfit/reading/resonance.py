@@ -6,20 +6,13 @@ from pathlib import Path
 
 import numpy as np
 
-from bushfit.errors import MeasurementError
 from bushfit.geometry import Place
-from bushfit.reading.headers import RESONANCE_COLUMNS, ZERO_TO_PEAK, Column
+from bushfit.reading.headers import RESONANCE_COLUMNS, WORDS, ZERO_TO_PEAK, Column
 from bushfit.reading.measurement import Complex, Floats, Source
 from bushfit.reading.table import Table
 
 #: Sets of columns that give a transmissibility, in order of preference.
-_COLUMN_SETS = (
-    ("transmissibility", "phase"),
-    ("transmissibility_real", "transmissibility_imaginary"),
-    ("base_acceleration", "mass_acceleration", "base_phase", "mass_phase"),
-    ("base_acceleration", "mass_acceleration", "phase"),
-    ("base_real", "base_imaginary", "mass_real", "mass_imaginary"),
-)
+_COLUMN_SETS = [columns.split() for columns in WORDS["sets"]["transmissibility"]]
 #: Roles that only a resonance test has.
 _SPECIFIC = {role for role in RESONANCE_COLUMNS if role not in ("frequency", "phase")}
 #: Roles whose values must be positive.
@@ -99,20 +92,14 @@ def _resonance_columns(table: Table, place: Place, *, has_stated_base: bool) -> 
             hint='correct the header, or name the column: --column "mass_acceleration=..."',
         )
     has_base = any(role.startswith("base") for role in columns) or "base_acceleration" in table.roles
-    if has_base and has_stated_base:
-        raise MeasurementError(
-            "the acceleration of the base is stated twice",
-            file=table.file,
-            found="a column of the file, and --base-acceleration",
-            expected="one of them",
-            hint="leave --base-acceleration out",
-        )
-    if not (has_base or has_stated_base):
-        raise table.header_error(
-            "the acceleration of the base is not stated",
-            expected="a column such as base acceleration [g]",
-            hint='state it: --base-acceleration "0.1 g"',
-        )
+    if has_base == has_stated_base:
+        problem, found, expected = "stated twice", "a column of the file, and --base-acceleration", "one of them"
+        hint = "leave --base-acceleration out"
+        if not has_base:
+            problem, found, expected = "not stated", ", ".join(table.headers), "a column such as base acceleration [g]"
+            hint = 'state it: --base-acceleration "0.1 g"'
+        problem = f"the acceleration of the base is {problem}"
+        raise table.header_error(problem, found=found, expected=expected, hint=hint)
     roles = [role for role in ("base_acceleration",) if role in table.roles and role not in columns]
     wanted = {role: table.column(role, place) for role in ("frequency", *columns, *roles)}
     return {

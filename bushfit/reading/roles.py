@@ -10,18 +10,9 @@ _STRAINING = STRAINING_COLUMNS | {"amplitude": SWEEP_COLUMNS["amplitude"] + STRA
 #: Roles whose names depend on the motion: displacement or strain, force or stress, stiffness or modulus.
 OF_MOTION = (*_STRAINING, "amplitude_reached", "force_amplitude", "damping_coefficient")
 #: Pairs of columns that determine a complex stiffness and must agree, in order of preference.
-AGREEING_PAIRS = (
-    *(("stiffness", "loss_factor"), ("stiffness", "phase"), ("storage_stiffness", "loss_stiffness")),
-    *(("storage_stiffness", "loss_factor"), ("storage_stiffness", "phase")),
-)
+AGREEING_PAIRS = [(size, loss) for size, loss in map(str.split, WORDS["sets"]["agreeing"])]
 #: All pairs of columns that determine a complex stiffness, in order of preference.
-PAIRS = (
-    *AGREEING_PAIRS,
-    *(("stiffness", "loss_stiffness"), ("storage_stiffness", "damping_coefficient")),
-    *(("stiffness", "damping_coefficient"), ("stiffness", "damping_ratio"), ("storage_stiffness", "damping_ratio")),
-    *(("storage_compliance", "loss_compliance"), ("compliance", "phase"), ("compliance", "loss_factor")),
-    *(("force_amplitude", "phase"), ("force_amplitude", "loss_factor"), ("force_amplitude", "damping_ratio")),
-)
+PAIRS = AGREEING_PAIRS + [(size, loss) for size, loss in map(str.split, WORDS["sets"]["stiffness"])]
 #: SI unit, or the attribute of a motion that is the SI unit, by role; all other roles are ratios.
 _UNITS = {role: unit for unit, roles in WORDS["si_units"].items() for role in roles}
 

@@ -72,11 +72,10 @@ class Text:
     def may_contain(self, sign: str, layout: Layout) -> bool:
         """Return True if cells below the header can contain a decimal mark or thousands separator."""
         start = self.offset(layout.lines_before_data)
-        if sign == " ":
-            grouped = layout.delimiter != " " and _GROUP_BY_BLANK.search(self.data, start) is not None
-            return grouped or any(self.data.find(blank.encode(), start) >= 0 for blank in BLANKS[1:])
-        marks = APOSTROPHES if sign == "'" else '"' if sign == layout.delimiter == "," else sign
-        return any(self.data.find(mark.encode(), start) >= 0 for mark in marks)
+        quoted = '"' if sign == layout.delimiter == "," else sign  # only a quoted cell can contain the delimiter
+        marks = {" ": BLANKS[1:], "'": APOSTROPHES}.get(sign, quoted)
+        is_grouped = sign == " " != layout.delimiter and _GROUP_BY_BLANK.search(self.data, start) is not None
+        return is_grouped or any(self.data.find(mark.encode(), start) >= 0 for mark in marks)
 
     def first_words(self, delimiter: str) -> set[str]:
         """Return the distinct texts without digits in the first column, such as "Mean" of a summary row."""

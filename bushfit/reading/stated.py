@@ -222,16 +222,11 @@ class LoopFile(TestFile):
     def __post_init__(self) -> None:
         is_incomplete = (self.frequency is None) != (self.waveform is None)
         if is_incomplete or sum(map(bool, (self.sampling_rate, self.rate, self.frequency))) > 1:
-            raise ValueError(
-                CampaignError(
-                    "these keys do not settle the time of a loop",
-                    found=", ".join(
-                        key for key in ("sampling_rate", "rate", "frequency", "waveform") if getattr(self, key)
-                    ),
-                    expected='sampling_rate, or rate, or frequency and waveform ("sine" or "triangle") together',
-                    hint='state waveform = "sine" beside it' if self.frequency and is_incomplete else None,
-                )
-            )
+            keys = [key for key in ("sampling_rate", "rate", "frequency", "waveform") if getattr(self, key)]
+            expected = 'sampling_rate, or rate, or frequency and waveform ("sine" or "triangle") together'
+            hint = 'state waveform = "sine" beside it' if self.frequency and is_incomplete else None
+            problem = "these keys do not settle the time of a loop"
+            raise ValueError(CampaignError(problem, found=", ".join(keys), expected=expected, hint=hint))
 
     @property
     def states_time(self) -> bool:

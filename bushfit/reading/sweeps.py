@@ -174,13 +174,13 @@ def sweep_columns(
     convention = in_header or convention or "zero-to-peak"
     force = columns.get("force_amplitude")
     if force and not force.convention and convention != "zero-to-peak":
-        form = {"peak-to-peak": "p-p", "rms": "rms"}[convention]
+        forms = ("p-p" if convention == "peak-to-peak" else "rms", "0-p")
+        units = " or ".join(f'units = {{ force_amplitude = "{force.unit} {form}" }}' for form in forms)
         raise table.header_error(
             "the header does not state the convention of the force amplitudes",
             found=f'"{force.header}" beside a displacement that is {convention}',
             expected="p-p, rms or 0-p in the header",
-            hint=" or ".join(f'units = {{ force_amplitude = "{force.unit} {end}" }}' for end in (form, "0-p"))
-            + " in the campaign",
+            hint=f"{units} in the campaign",
         )
     for role in ("amplitude", "amplitude_reached", "force_amplitude"):
         if column := columns.get(role):
