@@ -302,7 +302,8 @@ def _moves_along(cells: Cells, first: Column, second: Column) -> bool:
     """Return True if a second column records the motion of a displacement in another size, as an extensometer does."""
     if not (first.unit and second.unit and units.is_compatible(second.unit, first.unit)):
         return False
-    start = cells.parse(next(cells.blocks()), frozenset((first.index, second.index)))  # far beyond the first rows
+    channels = replace(cells, roles={"first": first, "second": second})  # whose cells show the decimal mark
+    start = channels.parse(next(channels.blocks()), frozenset((first.index, second.index)))  # far beyond the first rows
     numbers = np.array([start[first.index], start[second.index]]).T if start else _first_numbers(cells, (first, second))
     numbers = numbers * [units.si_factor(unit, first.unit) for unit in (first.unit, second.unit)]
     spans = [float(np.ptp(values)) for values in numbers.T] if len(numbers) else [0.0, 0.0]
