@@ -393,8 +393,10 @@ def ripple(prepared: PreparedLoop) -> list[str]:
     if lines[line] <= max(_SMALLEST_RIPPLE * prepared.amplitude, _RIPPLE_LINE * float(np.median(lines))):
         return []
     unit, factor = loop.direction.display.displacement
+    is_mains = min(abs(frequency[line] % mains - offset) for mains in (50.0, 60.0) for offset in (0.0, mains)) < 1.0
+    cause = "mains hum" if is_mains else "an oscillating controller, or play at the reversals"
     return [
         f"a ripple of about {number(factor * lines[line], 2)} {unit} at {frequency[line]:.3g} Hz "
         f"({number(100 * lines[line] / prepared.amplitude, 2)} % of the amplitude) is superposed on the motion: "
-        "mains hum, or an oscillating controller? The slow motion is read as the loop"
+        f"{cause}? The slow motion is read as the loop"
     ]

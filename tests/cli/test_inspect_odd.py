@@ -39,7 +39,7 @@ def inspected(typed: Run, file: str) -> dict[str, object]:
 @pytest.mark.parametrize(
     "ripple",
     [
-        *[(percent, frequency) for percent in (0.1, 0.5) for frequency in (5.0, 12.3, 25.0)],
+        *[(percent, frequency) for percent in (0.1, 0.5) for frequency in (5.0, 12.3, 25.0, 49.3)],
         *["hunting at the reversals", "ringing after the reversals", "a sensor that flickers at an end stop"],
     ],
     ids=str,
@@ -67,6 +67,7 @@ def test_a_ripple_is_no_loop(typed, root, tmp_path, ripple):
     assert len(said) == 1
     if isinstance(ripple, tuple):
         assert f"at {ripple[1]:g} Hz" in said[0]
+        assert ("mains hum" in said[0]) == (ripple[1] == 49.3)
         assert float(said[0].split()[4]) == pytest.approx(ripple[0] / 100.0, rel=0.25)
 
 
