@@ -10,8 +10,8 @@ def adjust(p: Values, condition: Condition) -> dict[str, Value]:
     """Reduce all moduli and stresses of rubber that was strained further before (Mullins effect).
 
     Args:
-        p: parameter values by name: all moduli and stresses [Pa]; and share [1], of which erf(1) = 0.84 is lost after
-            a much larger amplitude.
+        p: parameter values by name: all moduli and stresses [Pa]; and share [1]. After a much larger amplitude,
+            erf(1) share = 0.84 share of them is lost.
         condition: operating condition, with the strain amplitude e0 and the strain history of the test.
 
     Returns:

@@ -130,10 +130,10 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
         ):
             estimate = estimate + step
             many = imposed.ndim > 1  # else of many models on one motion the last is kept
-            kept = (stiffness_below, estimate)
-            kept = kept if many else tuple(array.reshape(-1, array.shape[-1])[-1].copy() for array in kept)
+            latest = (stiffness_below, estimate)
+            latest = latest if many else tuple(rows.reshape(-1, rows.shape[-1])[-1].copy() for rows in latest)
             poor = number >= 16  # iterations, twice the usual: K is measured anew for the next solution
-            solved["compliance"] = (None if poor else kept[0], kept[1])
+            solved["compliance"] = (None if poor else latest[0], latest[1])
             return estimate
         idle = 0 if np.any(error < _NEARER * best) else idle + 1
         if idle == _IDLE:

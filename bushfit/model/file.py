@@ -90,8 +90,8 @@ def from_document(document: object, file: Path | None = None) -> Result:
         for rank, row in enumerate(tables.alternatives, 1):
             with error_location(place=f"alternatives, #{rank}"):
                 unnamed = tables.unnamed if UNNAMED in row.effects else None
-                other = Model(bushing, row.effects, row.values, unnamed)
-                alternatives.append(Alternative(other, row.probability, _covariance(row.covariance, other)))
+                rival = Model(bushing, row.effects, row.values, unnamed)
+                alternatives.append(Alternative(rival, row.probability, _covariance(row.covariance, rival)))
         result = Result(
             model,
             fitted=tuple(name for name, entry in entries.items() if entry.vary),
@@ -193,9 +193,9 @@ def to_document(result: Result) -> dict[str, Any]:
         model_error=result.model_error,
         alternatives=tuple(
             AlternativeTable(
-                other.model.effects, dict(other.model.values), other.probability, _covariance_table(other.covariance)
+                rival.model.effects, dict(rival.model.values), rival.probability, _covariance_table(rival.covariance)
             )
-            for other in result.alternatives
+            for rival in result.alternatives
         ),
         warnings=result.warnings,
         outliers=result.outliers,

@@ -34,7 +34,7 @@ class Model:
     """Immutable model of a bushing: its geometry, the effects that act, and one value per parameter.
 
     Args:
-        bushing: geometry; None for a compound of which only specimens are known.
+        bushing: geometry; None for a compound that is known from specimens alone.
         effects: names of effects from the library, in any order.
         values: SI value of every parameter, by its name in files and reports.
         unnamed: data of the smooth correction `unnamed`; None if `effects` does not include it.
@@ -110,7 +110,7 @@ class Model:
 
     @property
     def without_time_law(self) -> list[str]:
-        """Names of the effects of which only the steady first harmonic is known, and no law in time."""
+        """Names of the effects that have a law of the steady first harmonic alone, and none in time."""
         return [effect.name for effect in self.records if effect.harmonic_only]
 
     def require_time_law(self) -> None:

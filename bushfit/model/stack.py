@@ -87,12 +87,15 @@ class Stack:
         return model.stiffness_per_modulus(place) * modulus
 
     def cycle(self, omega: Array, motion: Array, points: Any) -> Array:
-        """Force [N or N m] over one steady cycle of any waveform, (..., k, n).
+        """Compute the force over one steady cycle of any waveform.
 
         Args:
             omega: angular frequencies [rad/s], (..., k).
             motion: displacement [m] or rotation [rad] over a cycle, (..., k, n).
             points: numpy index of these k operating points in the test.
+
+        Returns:
+            Force [N] or moment [N m], (..., k, n).
         """
         per_sample = {
             name: value if np.ndim(value) == 0 else np.asarray(value)[..., None] for name, value in self.values.items()
@@ -103,7 +106,14 @@ class Stack:
         return Stack(self.model, setting, per_sample, layers).force(history)
 
     def force(self, displacement: History) -> Array:
-        """Force [N] or moment [N m] over time, (..., n), for a history of displacement [m] or rotation [rad]."""
+        """Compute the force over time.
+
+        Args:
+            displacement: history of displacement [m] or rotation [rad], (..., n).
+
+        Returns:
+            Force [N] or moment [N m], (..., n).
+        """
         if self.layers:
             layer, layer_values = self.layers[-1]
             return layer.force(layer_values, self.below.force, displacement, self.setting)

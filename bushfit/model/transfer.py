@@ -53,8 +53,8 @@ def with_factor(result: Result, places: Sequence[str], spread: float) -> Result:
         model=with_factors(result.model),
         covariance=result.covariance.with_independent(names, spread),
         alternatives=tuple(
-            replace(other, model=with_factors(other.model), covariance=other.covariance.with_independent(names, spread))
-            for other in result.alternatives
+            replace(rival, model=with_factors(rival.model), covariance=rival.covariance.with_independent(names, spread))
+            for rival in result.alternatives
         ),
     )
 
