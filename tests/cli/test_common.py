@@ -174,7 +174,7 @@ ASKED = [
     ("fit-", {"plain,fit-static", "plain,fit-dynamic"}), ("fit|x.toml|--prof", {"plain,--profile"}),
     ("fit|x.toml|--loss|", {"plain,linear", "plain,soft_l1"}), ("export|m.json|--format|na", {"plain,nastran"}),
     ("run|conf", {"file,conf"}), ("init|x.csv|--direction|ra", {"plain,radial"}),
-    ("inspect|configs/cmp_15961.toml|--thou", {"plain,--thousands"}),
+    ("inspect|configs/cmp_15961.toml|--unit|mm|--thou", {"plain,--thousands"}),
 ]  # fmt: skip
 
 
