@@ -143,7 +143,7 @@ def sweep(*amplitudes: float, band: tuple[float, ...] = BAND) -> SimulatedSweep:
 LACKING = {
     "small amplitudes": (
         (loop(3e-5, 0.1),), (sweep(1e-5, 3e-5),),
-        "of eps_half: sigma_fmax and eps_half", "mu + sigma_fmax/eps_half",
+        "sigma_fmax and eps_half are determined only as a ratio", "mu + sigma_fmax/eps_half",
     ),
     "one loop": ((loop(1e-3, 0.1),), (), "one loop rate, 0.1 Hz", "sin(pi alpha/2) at 0.1 Hz"),
     "loops of one rate": (
