@@ -51,8 +51,7 @@ class GapDescription:
     @property
     def description(self) -> Description | None:
         """Entry of diagnosis.json for the power law of the gap; None if the gap does not follow a power law."""
-        law = self.power_law
-        if law is None or not law.is_likely or not any(law.determined):
+        if (law := self.power_law) is None:
             return None
         return Description(law.phase_deg, law.frequency_power, law.amplitude_power, law.sentence)
 
@@ -90,6 +89,7 @@ def describe(evidence: Evidence, rig: RigSettings, start: Mapping[str, float], b
     after = Evidence(fitted.reevaluate(model, harmonic))
     whole = Evidence(fitted.reevaluate(model, evidence.data_sets))
     law = nearest_power_law(Evidence(base), rig, start, bounds)
+    law = law if law and law.is_likely and any(law.determined) else None
     sentences = _form(correction, law), _validity(correction, whole)
     return GapDescription(after, fitted, _hold_out_inside(evidence, fitted), law, *sentences)
 
@@ -138,7 +138,7 @@ def _form(correction: Unnamed, law: PowerLaw | None) -> str:
     """
     half = Z95 * correction.uncertainty * correction.largest
     largest, band = (number(100.0 * share, 2) for share in (correction.largest, half))
-    form = law.sentence if law and law.is_likely and any(law.determined) else "its form is not a power law"
+    form = law.sentence if law else "its form is not a power law"
     return f"up to {largest} ± {band} % of |K|; {form}"
 
 

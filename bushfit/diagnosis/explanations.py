@@ -314,23 +314,21 @@ def unnamed_curves(evidence: Evidence) -> list[Explanation]:
     """
     loops, sweeps = split_by_kind(evidence.data_sets)
     groups: dict[str, Group] = {}
-    directions = dict.fromkeys(str(sweep.direction) for sweep in sweeps)
+    levels: dict[tuple[str, Hashable], list[MeasuredSweep]] = defaultdict(list)  # by direction and temperature
+    for sweep in sweeps:
+        kelvin = sweep.sweep.temperature
+        level = None if kelvin is None else round(float(np.mean(kelvin)) / SAME_TEMPERATURE)
+        levels[str(sweep.direction), level].append(sweep)
+    directions: dict[str, list[tuple[Array, Array]]] = defaultdict(list)  # masks of residuals and of operating points
+    for (direction, _), chosen in levels.items():
+        rows = np.zeros(evidence.residual.size, dtype=bool)
+        for sweep in chosen:
+            rows[evidence.residual_rows[sweep]] = True
+        points = np.concatenate([np.full(sweep.frequency.size, sweep in chosen) for sweep in sweeps])
+        directions[direction].append((rows, points))
     for roughness, lengths in _CURVE_LENGTHS.items() if sweeps else ():
         columns, changes = _smooth_changes(evidence, sweeps, lengths, **_CURVE_PATTERNS)
-        for direction in directions:
-            by_temperature: dict[Hashable, list[MeasuredSweep]] = defaultdict(list)
-            for sweep in sweeps:
-                if str(sweep.direction) == direction:
-                    kelvin = sweep.sweep.temperature
-                    level = None if kelvin is None else round(float(np.mean(kelvin)) / SAME_TEMPERATURE)
-                    by_temperature[level].append(sweep)
-            masks = []  # of the residuals and of the points at which a curve acts
-            for chosen in by_temperature.values():
-                rows = np.zeros(columns.shape[-1], dtype=bool)
-                for sweep in chosen:
-                    rows[evidence.residual_rows[sweep]] = True
-                points = np.concatenate([np.full(sweep.frequency.size, sweep in chosen) for sweep in sweeps])
-                masks.append((rows, points))
+        for direction, masks in directions.items():
             groups[f"{roughness} {direction}"] = Group(
                 np.concatenate([columns * rows for rows, _ in masks]),
                 np.concatenate([changes * points for _, points in masks]),
