@@ -96,10 +96,9 @@ def explanation_odds(finding: Finding) -> Odds:
         parts += [f"a faulty test: {part.name}" for part in composition.faulty_parts]
         *parts, last = (*parts, *_nameless(composition))
         sentences.append(", and ".join(filter(None, (", ".join(parts), last))))
-        evidence = composition.best.state.evidence
-        fits.append(
-            (evidence.model, evidence.covariance_of(evidence.model.values)) if composition.best.refitted else None
-        )
+        is_rival = finding.verdict == "ambiguous" or composition is not finding.reported[0]
+        evidence, shown = composition.best.state.evidence, is_rival and composition.best.refitted
+        fits.append((evidence.model, evidence.covariance_of(evidence.model.values)) if shown else None)
     pairs = tuple(zip(sentences, (composition.probability for composition in compositions), strict=True))
     labels = tuple(label(composition) for composition in compositions)
     return Odds(finding.nothing, pairs, tuple(fits), labels, finding.verdict == "ambiguous")

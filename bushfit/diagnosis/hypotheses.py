@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -20,7 +20,7 @@ from bushfit.diagnosis.priors import LEVELS
 from bushfit.diagnosis.propose import Proposal, proposals
 from bushfit.diagnosis.record import DiagnosisSettings
 from bushfit.diagnosis.rig_errors import RigErrors, in_scatter_units, rig_errors
-from bushfit.effects import get_effect, qualified_name
+from bushfit.effects import get_effect, get_parameter, qualified_name
 from bushfit.effects.contract import Array
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.rig_class import ASSUMED, class_errors
@@ -296,19 +296,22 @@ class SearchState:
         columns += [deviation * compound.whole] if compound else []
         return np.concatenate(columns) if columns else None
 
-    def amount_covariance(self, names: Collection[str]) -> Covariance:
-        """Covariance of named parameters beside the rig's errors and a deviation of the compound in all its patterns.
+    @cached_property
+    def parameters(self) -> tuple[dict[str, float], Covariance]:
+        """Posterior means [SI] and covariance of the parameters inside their ranges.
 
-        Args:
-            names: names of parameters; those at the end of their range are left out.
+        They include what the rig's errors and a deviation of the compound in all its patterns could imitate.
         """
-        solution = self.bare.solution
+        solution, values = self.bare.solution, self.bare.model.values
         linear = replace(self.linear, compound=compound(self.bare, MAXIMUM_NODES), chosen_cases=self._likely_cases)
         moves = np.isfinite([self.precision.get(name, 0.0) for name in solution.coordinates.names])
-        slopes, rows = solution.coordinates.slopes(self.bare.model.values)[moves], slice(np.count_nonzero(moves))
-        matrix = linear.parameter_covariance()[rows, rows] * np.outer(slopes, slopes)
-        fitted = Covariance(tuple(np.array(solution.coordinates.names)[moves].tolist()), matrix)
-        return fitted.restricted([name for name in names if name not in solution.at_bound])
+        slopes, count = solution.coordinates.slopes(values)[moves], np.count_nonzero(moves)
+        names = tuple(np.array(solution.coordinates.names)[moves].tolist())
+        mean, covariance = linear.parameters()
+        steps = dict(zip(names, slopes * mean[:count], strict=True))
+        means = {name: float(np.clip(values[name] + x, *get_parameter(name).bounds)) for name, x in steps.items()}
+        fitted = Covariance(names, covariance[:count, :count] * np.outer(slopes, slopes))
+        return means, fitted.restricted([name for name in names if name not in solution.at_bound])
 
     @cached_property
     def proposals(self) -> list[Proposal]:
@@ -373,3 +376,29 @@ class SearchState:
         log_posterior = self.log_weight + self.linear.log_evidence_with_level_errors
         change = max(self.change, LEVELS[-1][0] * max(class_errors(self.tests.rig, ASSUMED)))
         return [*self.extended(self.linear.evidence), Hypothesis(self, log_posterior, change, levels=True)]
+
+
+def mean_parameters(hypotheses: Sequence[Hypothesis], names: Sequence[str]) -> tuple[dict[str, float], Covariance]:
+    """Average the posteriors of parameters over hypotheses by probability.
+
+    Args:
+        hypotheses: refitted hypotheses whose models have these parameters.
+        names: names of the k parameters.
+
+    Returns:
+        Means [SI], and covariance within and between the hypotheses.
+    """
+    log_posteriors = np.array([hypothesis.log_posterior for hypothesis in hypotheses])
+    near = np.flatnonzero(log_posteriors > log_posteriors.max() - _NEAR).tolist()
+    weights = np.exp(log_posteriors[near] - log_posteriors.max())
+    weights /= weights.sum()
+    states = [hypotheses[n].state for n in near]
+    pairs = [({**state.evidence.model.values, **state.parameters[0]}, state.parameters[1]) for state in states]
+    means = np.array([[values[name] for name in names] for values, _ in pairs])
+    mean = weights @ means
+    matrix = np.einsum("n,ni,nj->ij", weights, means - mean, means - mean)
+    for weight, (_, covariance) in zip(weights, pairs, strict=True):
+        known = covariance.restricted(names)
+        indices = [names.index(name) for name in known.names]
+        matrix[np.ix_(indices, indices)] += weight * known.matrix
+    return dict(zip(names, mean.tolist(), strict=True)), Covariance(tuple(names), matrix)

@@ -153,10 +153,11 @@ class LinearModel(ProjectedColumns):
         freedom = max(self.residual.size - int(np.count_nonzero(self.precision == 0.0)), 1)
         return float(np.exp(base - _log_sum(base)) @ chdtrc(freedom, self.products.misfit))
 
-    def parameter_covariance(self) -> Array:
-        """Mean square errors of the k rows of the Jacobian about the fit, averaged over the noise cases, (k, k).
+    def parameters(self) -> tuple[Array, Array]:
+        """Posterior of the changes of the k rows of the Jacobian from the fit, averaged over the noise cases.
 
-        They include the difference between the fit and the mean of the posterior in each noise case.
+        Returns:
+            Mean, (k,), and covariance within and between the noise cases, (k, k).
         """
         group = Group(self.jacobian, np.eye(len(self.jacobian)), act_together=True)
         alone = replace(self, jacobian=self.jacobian[:0], precision=self.precision[:0], groups=(group,)).products
@@ -164,7 +165,9 @@ class LinearModel(ProjectedColumns):
         shift = np.einsum("nij,nj->ni", covariance, alone.projections[0][:, 0])
         base = np.where(self._is_plain | (self.deviations > 0.0), self.products.base, -np.inf)
         share = np.exp(base - _log_sum(base))
-        return np.einsum("n,nij->ij", share, covariance) + np.einsum("n,ni,nj->ij", share, shift, shift)
+        mean = share @ shift
+        between = np.einsum("n,ni,nj->ij", share, shift - mean, shift - mean)
+        return -mean, np.einsum("n,nij->ij", share, covariance) + between
 
     def amounts(self, number: int) -> tuple[Array, Array]:
         """Posterior mean and covariance of the amounts of a group whose g columns act together.

@@ -109,7 +109,8 @@ class Odds:
     Args:
         nothing: probability that nothing is missing beyond noise and tolerance.
         explanations: text and probability (if anything is missing) of each explanation, the most probable first.
-        fits: fitted model of each explanation, with its covariance; None for an explanation that was not fitted.
+        fits: fitted model of each explanation, with its covariance; None for the explanation of the result, and for an
+            explanation that was not fitted.
         labels: names of the effects, mistakes and faults of each explanation, joined by " + ".
         are_alternatives: True if the tests cannot decide between the explanations, so that each is an alternative.
     """

@@ -19,7 +19,7 @@ from bushfit.diagnosis.explanation_text import (
     reported_names,
 )
 from bushfit.diagnosis.holdout import HoldOut, hold_out
-from bushfit.diagnosis.hypotheses import DiagnosisRequest, Hypothesis
+from bushfit.diagnosis.hypotheses import DiagnosisRequest, Hypothesis, mean_parameters
 from bushfit.diagnosis.locate import find_regions
 from bushfit.diagnosis.next_test import deciding_test
 from bushfit.diagnosis.priors import LARGEST_CLOSED_GAP
@@ -84,18 +84,17 @@ class DiagnosisWriter:
     def _named(self, first: Composition) -> Diagnosis:
         """Diagnosis in which named effects explain the gap, or part of it with a description of the rest."""
         request, names = self.request, self.finding.names
-        states = [h.state for h in self.hypotheses if h.refitted and set(h.effects) >= set(names)]
-        known, fixed = None, request.base.fixed
+        refitted = [h for h in self.hypotheses if h.refitted and not h.claim and set(h.effects) >= set(names)]
+        known, fixed, state = None, request.base.fixed, refitted[0].state
         if self.finding.verdict == "partly" and first.unnamed:  # without the compound's deviation amounts are distorted
-            state, model = states[0], request.base.model
+            model = request.base.model
             for name in names:
                 model = model.with_effect(name)
-            added = {
-                key: state.evidence.model.values[key] for key in model.values if key not in request.base.model.values
-            }
-            model, fixed, known = model.with_values(added), [*fixed, *added], state.amount_covariance(added)
+            amounts = [name for name in model.values if name not in request.base.model.values]
+            added, known = mean_parameters(refitted, amounts)
+            model, fixed = model.with_values(added), [*fixed, *added]
         else:
-            state = min(states, key=lambda state: len(state.effects) > len(names))
+            state = min((h.state for h in refitted), key=lambda state: len(state.effects) > len(names))
             model = state.evidence.model
             for name in state.effects:
                 model = model if name in names else model.without(name)

@@ -14,6 +14,7 @@ from bushfit.geometry import Place
 from bushfit.model.covariance import Z95, Covariance
 from bushfit.model.model import Model
 from bushfit.model.result import Result
+from bushfit.model.sensitivity import stiffness_and_slopes
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +111,7 @@ class Uncertainty:
         covariance: covariance of the k uncertain parameters of the model.
         scale: factor by which to multiply the errors of the parameters at each point, (n,): 1, or less within the
             tested range if there is an error of the model, which replaces them.
-        relative: complex relative errors of the stiffness by e independent errors of the model, (e, n); e is 0 or 2.
+        relative: complex relative errors of the stiffness by e independent errors of the model, (e, n).
     """
 
     covariance: Covariance
@@ -148,8 +149,9 @@ def uncertainty(
 
     Returns:
         Errors. An unnamed correction or a model error adds an error of the real and one of the imaginary part; within
-        the measured range these replace the errors of the parameters. An untested direction of a bushing has the model
-        error of the tested ones at equal strain.
+        the measured range these replace the errors of the parameters, but not those of effects that `model` lacks: the
+        measured stiffness without an effect is as uncertain as the effect. An untested direction of a bushing has the
+        model error of the tested ones at equal strain.
     """
     names = [name for name in result.covariance.names if name in model.values]
     covariance = result.covariance.restricted(names)
@@ -160,4 +162,9 @@ def uncertainty(
         model.setting(place, conditions=conditions), 2.0 * np.pi * frequency, amplitude
     )
     relative = error / (1.0 + share) if model.unnamed else np.hypot(error, [share.real, share.imag])
-    return Uncertainty(covariance, np.sqrt(1.0 - np.square(weight)), np.array([[1.0], [1.0j]]) * relative)
+    left_out = result.covariance.restricted([name for name in result.covariance.names if name not in model.values])
+    stiffness, slopes = stiffness_and_slopes(
+        result.model, place, frequency, amplitude, left_out.names, conditions=conditions
+    )
+    errors = np.concatenate((np.array([[1.0], [1.0j]]) * relative, left_out.root.T @ slopes / stiffness))
+    return Uncertainty(covariance, np.sqrt(1.0 - np.square(weight)), errors)

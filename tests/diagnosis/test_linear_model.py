@@ -166,21 +166,25 @@ def test_amounts_are_those_of_a_dense_posterior(number):
 
 
 def test_errors_of_parameters_are_those_of_a_dense_posterior():
-    """About the fit, beside errors of the rig and a compound that deviates, mixed by the evidence of each case."""
+    """Mean and covariance beside errors of the rig and a compound that deviates, mixed by evidence."""
     plain = ledger(5, groups=False)
     columns = np.random.default_rng(5).normal(size=(2, plain.residual.size))
     cases = [replace(case, compound=size) for case in CASES[:2] for size in (0.0, 0.5)]
     of = replace(plain, rig=RigErrors(plain.rig.blocks, cases), compound=Group(columns, np.eye(2), act_together=True))
-    log_weights, errors, own = [], [], of.precision == 0.0
+    log_weights, means, seconds, own = [], [], [], of.precision == 0.0
     for case in cases:
         whole = covariance(of, case) + case.compound**2 * columns.T @ columns
         log_weights.append(case.log_weight + restricted(of, whole))
         rows, noise = of.jacobian, whole - (of.jacobian[~own].T / of.precision[~own]) @ of.jacobian[~own]
         spread = np.linalg.inv(rows @ np.linalg.solve(noise, rows.T) + np.diag(of.precision))
         shift = spread @ rows @ np.linalg.solve(noise, of.residual)
-        errors.append(spread + np.outer(shift, shift))
+        means.append(-shift)
+        seconds.append(spread + np.outer(shift, shift))
     share = np.exp(log_weights - logsumexp(log_weights))
-    assert of.parameter_covariance() == pytest.approx(np.einsum("k,kij->ij", share, errors), rel=1e-6)
+    expected = share @ np.array(means)
+    mean, errors = of.parameters()
+    assert mean == pytest.approx(expected, rel=1e-5)
+    assert errors == pytest.approx(np.einsum("k,kij->ij", share, seconds) - np.outer(expected, expected), rel=1e-5)
 
 
 @pytest.mark.parametrize("node", range(2))
