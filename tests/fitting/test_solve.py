@@ -9,6 +9,7 @@ import pytest
 from bushfit.campaign.campaign import load_campaign
 from bushfit.effects import BASE, with_base
 from bushfit.errors import FitError
+from bushfit.fitting.common_error import CommonError
 from bushfit.fitting.coordinates import Coordinates
 from bushfit.fitting.descent import Descent
 from bushfit.fitting.preparation import MeasuredTest
@@ -56,6 +57,13 @@ def test_a_parameter_pushed_against_a_bound_rests_on_it_and_is_named(axial, pape
     free = solve(FitProblem(paper_model, axial, FIVE))
     assert not free.at_bound
     assert free.chi_square < solution.chi_square
+
+
+def test_an_error_that_tests_share_whitens_residuals_and_derivatives_alike(axial, paper_model):
+    columns = np.random.default_rng(0).normal(size=(2, sum(test.size for test in axial)))
+    problem, mu = FitProblem(paper_model, axial, FIVE, shared_error=CommonError(columns)), paper_model.values["mu"]
+    above, below = (problem.residual(paper_model.with_values({"mu": mu * np.exp(s)})) for s in (1e-5, -1e-5))
+    np.testing.assert_allclose(problem.jacobian(paper_model)[0], (above - below) / 2e-5, rtol=1e-3, atol=1e-2)
 
 
 @pytest.mark.parametrize("many", [10, pytest.param(100, marks=pytest.mark.slow)])
