@@ -5,7 +5,7 @@ Source: Garcia Tarrago et al. 2007, Eq. 5; M. Berg, Vehicle System Dynamics 30 (
 Notes:
     With u = s_f / sigma_fmax, sgn = sign(de/dt) and d = |e - e_s| / eps_half counted from the last turning point
     (e_s, u_s), Eq. (5) reads u = u_s + sgn d v / (v + d), v = 1 - sgn u_s. Only d holds eps_half, and sigma_fmax is a
-    factor. So u is computed from one turning point to the next.
+    factor. So u is computed from one turning point to the next, with its derivative by eps_half in closed form.
 """
 
 from collections.abc import Sequence
@@ -25,6 +25,8 @@ _ROUNDS = 50
 _SETTLED = 1e-14
 #: T(z) = (ln(1 + z) - z + z^2/2)/z^3 as a power series in z: enough terms for all digits below _SERIES_BELOW.
 _SERIES = np.array([(-1.0) ** k / (k + 3.0) for k in range(12)])
+#: dT/dz as a power series in z.
+_SERIES_SLOPE = np.array([(k + 1) * (-1.0) ** (k + 1) / (k + 4.0) for k in range(11)])
 
 
 def harmonic_shape(x: Array) -> Array:
@@ -62,6 +64,37 @@ def harmonic_shape(x: Array) -> Array:
         big_less_2 = x * (x + 6.0) / (s + 1.0) + x
         shape.imag[small] = (2.0 * big_less_2 / big - 8.0 * x / p * series) / np.pi
     return shape
+
+
+def harmonic_slope(x: Array, shape: Array) -> Array:
+    """Derivative of the friction loop's complex first harmonic h by the relative strain amplitude x.
+
+    Args:
+        x: strain amplitude over eps_half, any shape.
+        shape: `harmonic_shape(x)`.
+
+    Returns:
+        dh/dx, same shape.
+    """
+    s, big, p, q, z = _roots(x)
+    slope = np.empty(x.shape, dtype=complex)
+    slope_p = 4.0 / (s * (x + 3.0 + s))
+    slope_q = (slope_p * (p + x) + p) / q
+    slope.real = shape.real * (2.0 * slope_p / p - (1.0 + slope_p + slope_q) / (x + p + q) - slope_q / q)
+    far = np.maximum(x, _LEAST_X)
+    ratio = p * p / far
+    slope_ratio = (2.0 * p * slope_p - ratio) / far
+    slope_z = (2.0 - z * slope_p) / p
+    slope.imag = -((slope_ratio * np.log1p(z) + ratio * slope_z / (1.0 + z)) / np.pi + shape.imag) / far
+    small = z < _SERIES_BELOW
+    if small.any():
+        x, s, big, p, z, slope_p = x[small], s[small], big[small], p[small], z[small], slope_p[small]
+        series = np.polynomial.polynomial.polyval(z, _SERIES)
+        slope_series = np.polynomial.polynomial.polyval(z, _SERIES_SLOPE) * (2.0 - z * slope_p) / p
+        slope_big = (x + 3.0) / s + 1.0
+        bend = (1.0 - x * slope_p / p) * series + x * slope_series
+        slope.imag[small] = (4.0 * slope_big / big**2 - 8.0 / p * bend) / np.pi
+    return slope
 
 
 def _roots(x: Array) -> tuple[Array, Array, Array, Array, Array]:
@@ -115,7 +148,29 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
     return p["sigma_fmax"] / p["eps_half"] * harmonic_shape(strain / p["eps_half"])
 
 
-def _stroke(start: Any, sign: Any, distance: Any) -> Any:
+def modulus_sensitivities(p: Values, omega: Array, strain: Array) -> dict[str, Array]:
+    """Derivatives of the complex modulus of the friction branch by its parameters.
+
+    Args:
+        p: parameter values by name: largest friction stress sigma_fmax [Pa], strain eps_half [1] that develops half.
+        omega, strain: angular frequency [rad/s] and amplitude e0 of the tensor shear strain e = gamma/2 [1], (..., n).
+
+    Returns:
+        Derivatives by parameter name, each (..., n) [Pa per unit of the parameter].
+
+    Notes:
+        d/dsigma_fmax = h/eps_half and d/deps_half = -sigma_fmax/eps_half^2 (h + x h'), x = e0/eps_half, h of
+        `harmonic_shape`.
+    """
+    x = strain / p["eps_half"]
+    shape = harmonic_shape(x)
+    return {
+        "sigma_fmax": shape / p["eps_half"],
+        "eps_half": -p["sigma_fmax"] / p["eps_half"] ** 2 * (shape + x * harmonic_slope(x, shape)),
+    }
+
+
+def _stroke(start: Any, sign: Any, distance: Any) -> tuple[Any, Any, Any]:
     """Friction stress u, relative to sigma_fmax, along one stroke, the motion between two turning points.
 
     Args:
@@ -123,14 +178,29 @@ def _stroke(start: Any, sign: Any, distance: Any) -> Any:
         sign: +1 or -1, direction of the stroke.
         distance: strain d since the turning point, relative to eps_half, not negative.
 
+    Returns:
+        u, and two terms that its derivatives use: v = 1 - sign u_s and v + d.
+
     Notes:
-        u = u_s + sign d v/(v + d), v = 1 - sign u_s, Eq. 5 of Garcia Tarrago et al. (2007).
+        u = u_s + sign d v/(v + d), Eq. 5 of Garcia Tarrago et al. (2007).
     """
     room = 1.0 - sign * start
-    return start + sign * distance * room / (room + distance)
+    reach = room + distance
+    return start + sign * distance * room / reach, room, reach
 
 
-def _strokes(senses: Sequence[Any], distances: Sequence[Any], u: Any) -> tuple[list[Any], Any]:
+def _stroke_slopes(sign: Any, distance: Any, room: Any, reach: Any) -> tuple[Any, Any]:
+    """Derivatives of the relative friction stress u along a stroke by its start value u_s and by the distance d.
+
+    Args:
+        sign: +1 or -1, direction of the stroke.
+        distance: strain d since the turning point, relative to eps_half.
+        room, reach: terms v and v + d of the equation of the stroke, as `_stroke` returns them.
+    """
+    return 1.0 - (distance / reach) ** 2, sign * (room / reach) ** 2
+
+
+def _strokes(senses: Sequence[Any], distances: Sequence[Any], u: Any) -> list[tuple[Any, Any, Any]]:
     """Compute the friction stress u, relative to sigma_fmax, at the k + 1 turning points of k strokes.
 
     Args:
@@ -139,17 +209,19 @@ def _strokes(senses: Sequence[Any], distances: Sequence[Any], u: Any) -> tuple[l
         u: relative stress at the first turning point.
 
     Returns:
-        u at each turning point, and the derivative of the last u by the first.
+        For each turning point: u, du/d(ln eps_half) for a fixed start value, and the derivative by the start value.
     """
-    path, memory = [u], 1.0 + 0.0 * u
+    path = [(u, 0.0 * u, 1.0 + 0.0 * u)]
     for sense, distance in zip(senses, distances, strict=True):
-        memory = memory * (1.0 - (distance / (1.0 - sense * path[-1] + distance)) ** 2)
-        path.append(_stroke(path[-1], sense, distance))
-    return path, memory
+        start, slope, memory = path[-1]
+        end, *room_and_reach = _stroke(start, sense, distance)
+        by_start, by_distance = _stroke_slopes(sense, distance, *room_and_reach)
+        path.append((end, by_start * slope - by_distance * distance, by_start * memory))
+    return path
 
 
-def _stress_at_turning_points(strides: Array, periodic: bool, eps_half: Array) -> Array:
-    """Relative stress u at the start of each stroke of a motion, (..., k).
+def _stress_at_turning_points(strides: Array, periodic: bool, eps_half: Array) -> tuple[Array, Array]:
+    """Relative stress u and du/d(ln eps_half) at the start of each stroke of a motion, (..., k) each.
 
     Args:
         strides: signed length of each stroke (see `Turning`), (..., k).
@@ -162,23 +234,44 @@ def _stress_at_turning_points(strides: Array, periodic: bool, eps_half: Array) -
     """
     scaled = strides / eps_half
     if strides.shape[-1] == 1 and periodic:  # at rest
-        return np.zeros_like(scaled)
+        return np.zeros_like(scaled), np.zeros_like(scaled)
     if strides.shape[-1] == 2 and periodic:
         x = np.abs(scaled) / 2.0
-        return -np.sign(scaled) * 2.0 * x / _roots(x)[1]  # each stroke leads away from where it begins
+        s = np.sqrt(x * (x + 6.0) + 1.0)
+        senses = -np.sign(scaled)  # each piece leads away from where it begins
+        return senses * 2.0 * x / (s + x + 1.0), -senses * 4.0 * x / (s * (x + 3.0 + s))
     single = scaled.size == scaled.shape[-1]
     pieces = scaled.ravel() if single else np.moveaxis(scaled, -1, 0)
-    signs, lengths = (list[Any](value.tolist() if single else value) for value in (np.sign(pieces), np.abs(pieces)))
+    signs, paths = (list[Any](value.tolist() if single else value) for value in (np.sign(pieces), np.abs(pieces)))
     u: Any = 0.0 if single else np.zeros_like(pieces[0])
-    path, memory = _strokes(signs, lengths, u)
+    path, first = _strokes(signs, paths, u), 0.0
     for _ in range(_ROUNDS if periodic else 0):
+        end, slope, memory = path[-1]
         room = 1.0 - memory + (memory >= 1.0)  # one at rest keeps all
-        closer = np.clip(u + (path[-1] - u) / room, -1.0, 1.0)
+        first, closer = slope / room, np.clip(u + (end - u) / room, -1.0, 1.0)
         if np.all(np.abs(closer - u) < _SETTLED):
             break
         u = closer.item() if single else closer
-        path, memory = _strokes(signs, lengths, u)
-    return np.stack(path[:-1], axis=-1).reshape(scaled.shape)
+        path = _strokes(signs, paths, u)
+    turns = [(u, slope + memory * first) for u, slope, memory in path[:-1]]
+    u_at_turns, slopes = (np.stack(value, axis=-1).reshape(scaled.shape) for value in zip(*turns, strict=True))
+    return u_at_turns, slopes
+
+
+def _at_samples(eps_half: Array, history: History) -> tuple[Array, Array, Array, Array]:
+    """Friction stress at the start of each of the k strokes of a motion, and the travel of each of the n samples.
+
+    Args:
+        eps_half: friction parameter [1], (..., 1).
+        history: tensor shear strain e = gamma/2 over time [1], (..., n).
+
+    Returns:
+        Stress u relative to sigma_fmax, and du/d(ln eps_half), at the start of each stroke, (..., k) each; sign of each
+        sample's stroke, and strain since the start of this stroke relative to eps_half, (..., n) each.
+    """
+    turning, eps_half = history.turning, np.atleast_1d(np.asarray(eps_half, dtype=float))
+    sense, distance = np.sign(turning.travel), np.abs(turning.travel) / eps_half
+    return *_stress_at_turning_points(turning.strides, history.periodic, eps_half), sense, distance
 
 
 def stress(p: Values, history: History) -> Array:
@@ -199,6 +292,25 @@ def stress(p: Values, history: History) -> Array:
     >>> stress({"sigma_fmax": 2e4, "eps_half": 0.01}, History(np.array([0.01, 0.0, 0.01]), 1.0, False, 1.0)).round()
     array([10000., -2000.,  8476.])
     """
-    turning, eps_half = history.turning, np.atleast_1d(np.asarray(p["eps_half"], dtype=float))
-    start = turning.at_samples(_stress_at_turning_points(turning.strides, history.periodic, eps_half))
-    return p["sigma_fmax"] * _stroke(start, np.sign(turning.travel), np.abs(turning.travel) / eps_half)
+    start, _, sense, distance = _at_samples(p["eps_half"], history)
+    return p["sigma_fmax"] * _stroke(history.turning.at_samples(start), sense, distance)[0]
+
+
+def stress_sensitivities(p: Values, history: History) -> dict[str, Array]:
+    """Derivatives of the stress of the friction branch by its parameters.
+
+    Args:
+        p: parameter values by name: largest friction stress sigma_fmax [Pa], strain eps_half [1] that develops half.
+        history: tensor shear strain e = gamma/2 over time [1], (..., n).
+
+    Returns:
+        Derivatives by parameter name, each (..., n) [Pa per unit of the parameter].
+
+    Notes:
+        d/dsigma_fmax = u, the stress over sigma_fmax, and d/deps_half = sigma_fmax du/deps_half.
+    """
+    start, slope, sense, distance = _at_samples(p["eps_half"], history)
+    u, *room_and_reach = _stroke(history.turning.at_samples(start), sense, distance)
+    by_start, by_distance = _stroke_slopes(sense, distance, *room_and_reach)
+    slope = by_start * history.turning.at_samples(slope) - by_distance * distance  # by ln eps_half
+    return {"sigma_fmax": u, "eps_half": p["sigma_fmax"] * slope / p["eps_half"]}

@@ -14,7 +14,7 @@ from bushfit.fitting.measured_test import MeasuredBase
 from bushfit.fitting.prepared_loop import PreparedLoop
 from bushfit.model.model import Model
 from bushfit.model.result import Outlier
-from bushfit.model.sensitivity import force_and_slopes, stiffness_and_slopes
+from bushfit.model.sensitivity import force_and_slopes, force_slopes_of_branches, stiffness_and_slopes
 from bushfit.reading.measurement import Loop
 
 #: Harmonics that the model error of a loop has: alike up to the last smooth one, beyond they fall as 1/h.
@@ -176,8 +176,11 @@ class MeasuredLoop(MeasuredBase):
         """
         if (rows := self._recall("jacobian", model, tuple(names))) is None:
             history = self.prepared.history(model.is_transient)
-            force, slopes = force_and_slopes(model, self.direction, history, names, self.test_conditions)
-            self._keep("force", model, (), self.prepared.interpolate_at_rows(force) + (self.prepared.datum or 0.0))
+            if model.only_branches:  # whose derivatives do not need the force
+                slopes = force_slopes_of_branches(model, self.direction, history, names)
+            else:
+                force, slopes = force_and_slopes(model, self.direction, history, names, self.test_conditions)
+                self._keep("force", model, (), self.prepared.interpolate_at_rows(force) + (self.prepared.datum or 0.0))
             rows = self.whiten(self.prepared.interpolate_at_rows(slopes) * self._per_noise)
             self._keep("jacobian", model, tuple(names), rows)
         if added is None or not as_share:

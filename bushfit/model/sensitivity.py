@@ -1,18 +1,23 @@
-"""Derivatives of a model's response with respect to its parameters, by finite differences.
+"""Derivatives of a model's response with respect to its parameters.
 
-All differences come from one evaluation of the model, with the parameter values along a leading axis. They are
-one-sided: half the cost of central differences, and accurate to a millionth, which is enough for a fit.
+In a model of branches alone the derivatives of the branches add up: the paper's three branches have analytic
+derivatives, the others finite differences. With modifiers or layers, the derivatives are finite differences of the
+whole response, computed in one call with the parameter values along a leading axis. The differences are one-sided: half
+the cost of central differences, and accurate to a millionth, which is enough for a fit.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import cast
 
 import numpy as np
 
-from bushfit.effects import place_suffix
-from bushfit.effects.contract import UNKNOWN, Array, RubberConditions, Value
+from bushfit.effects import Branch, place_suffix, qualified_name
+from bushfit.effects.contract import UNKNOWN, Array, RubberConditions, Value, Values
 from bushfit.effects.history import History
-from bushfit.geometry import Place
+from bushfit.geometry import Place, Specimen
 from bushfit.model.model import Kind, Model
+from bushfit.model.structure import values_for_effect
 
 #: Step of the differences, relative to the value (log parameters) or to the typical distance (linear parameters);
 #: chosen: the differences are good to about a millionth.
@@ -42,14 +47,20 @@ def stiffness_and_slopes(
     Returns:
         Complex stiffness [N/m or N m/rad], (n,), and its derivatives per SI unit of each parameter, (k, n).
 
-    >>> axial = paper.setting("axial").direction
-    >>> _, slopes = stiffness_and_slopes(paper, axial, np.array([5.0]), np.array([1e-4]), ["mu"])
+    >>> _, slopes = stiffness_and_slopes(paper, Direction.AXIAL, np.array([5.0]), np.array([1e-4]), ["mu"])
     >>> slopes.round(4)
     array([[0.3634+0.j]])
     """
-    values, steps = stepped_values(model, direction, names)
-    responses = model.stiffness(direction, frequency, amplitude, kind=kind, values=values, conditions=conditions)
-    return difference_quotients(responses, steps)
+    if not model.only_branches:
+        respond = partial(model.stiffness, direction, frequency, amplitude, kind=kind, conditions=conditions)
+        return _differences_at(direction, model, names, respond)
+    test = 2.0 * np.pi * frequency, amplitude * model.unit_strain(direction)
+    modulus, slopes = np.zeros(frequency.size), np.zeros((len(names), frequency.size), dtype=complex)
+    for branch in model.structure.branches:
+        modulus = modulus + branch.modulus(values_for_effect(branch, model.values), *test)
+        _add_slopes(slopes, model, names, branch, branch.modulus, branch.modulus_sensitivities, test)
+    factor = model.stiffness_per_modulus(direction)
+    return factor * modulus, factor * slopes
 
 
 def force_and_slopes(
@@ -67,47 +78,109 @@ def force_and_slopes(
     Returns:
         Force [N or N m], (n,), and its derivatives per SI unit of each parameter, (k, n).
     """
-    values, steps = stepped_values(model, direction, names)
-    responses = model.force(direction, displacement, kind="loop", values=values, conditions=conditions)
-    return difference_quotients(responses, steps)
+    respond = partial(model.force, direction, displacement, kind="loop", conditions=conditions)
+    if not model.only_branches:
+        return _differences_at(direction, model, names, respond)
+    return respond(), force_slopes_of_branches(model, direction, displacement, names)
 
 
-def stepped_values(model: Model, place: Place, names: Sequence[str]) -> tuple[dict[str, Value], Array]:
-    """Parameter values for one-sided differences: each row has a step in one parameter, the last row has no step.
+def force_slopes_of_branches(model: Model, direction: Place, displacement: History, names: Sequence[str]) -> Array:
+    """Derivatives by parameters of the force of a model of branches alone, which do not need the force itself.
 
     Args:
-        model: model, whose values are stepped within their bounds.
-        place: direction or specimen of the response. Parameters of others, such as `stiffness_factor.radial` in axial
-            tests, do not change it: they have no row.
+        model: model without modifiers and layers.
+        direction: direction or specimen.
+        displacement: displacement history [m or rad] of n samples.
         names: names of k parameters.
 
     Returns:
-        Values by name, those of r parameters as arrays (r + 1, 1); and the step of each parameter [SI], (k,), 0 for
-        parameters without a row.
+        Derivatives per SI unit of each parameter, (k, n).
     """
-    varied = [name for name in names if place_suffix(name) in (None, *place.labels)]
-    values, steps = dict[str, Value](model.values), np.zeros(len(names))
-    for row, name in enumerate(varied):
-        parameter, value = model.parameters[name], model.values[name]
-        step = _RELATIVE_STEP * (abs(value) if parameter.log and value else parameter.typical)
-        column = np.full((len(varied) + 1, 1), value)
-        column[row] += step if value + step <= parameter.bounds[1] else -step
-        values[name], steps[names.index(name)] = column, column[row, 0] - value
-    return values, steps
+    per_displacement = model.unit_strain(direction)
+    slopes, test = np.zeros((len(names), displacement.value.shape[-1])), (displacement.scaled(per_displacement),)
+    for branch in model.structure.branches:
+        _add_slopes(slopes, model, names, branch, branch.stress, branch.stress_sensitivities, test)
+    return model.stiffness_per_modulus(direction) / (2.0 * per_displacement) * slopes
 
 
-def difference_quotients(responses: Array, steps: Array) -> tuple[Array, Array]:
-    """Response of a model and its derivatives, from its responses for the values by `stepped_values`.
+def _add_slopes(
+    slopes: Array,
+    model: Model,
+    names: Sequence[str],
+    branch: Branch,
+    respond: Callable[..., Array],
+    sensitivities: Callable[..., dict[str, Array]] | None,
+    test: tuple[object, ...],
+) -> None:
+    """Add the derivatives of a branch's response by the named parameters to the derivatives of the whole response.
 
     Args:
-        responses: responses for r stepped parameters, and then without a step, (r + 1, n), or (n,) if all are equal.
-        steps: step of each of k parameters [SI], 0 for those without a row, (k,).
+        slopes: derivatives by parameter, changed in place, (len(names), n).
+        model: model; the derivatives are taken at its parameter values.
+        names: names of the parameters.
+        branch: effect that adds a stress.
+        respond: function of the parameter values and `test` that returns the branch's response, (n,).
+        sensitivities: the same for derivatives by parameter name; None for numerical derivatives.
+        test: further arguments of both functions.
+    """
+    row = {name: i for i, name in enumerate(names)}
+    qualified = {parameter.name: qualified_name(branch, parameter) for parameter in branch.parameters}
+    varied = [name for name in (*qualified.values(), *branch.uses) if name in row]
+    if varied and sensitivities:
+        analytic = sensitivities(values_for_effect(branch, model.values), *test)
+        for short, name in qualified.items():
+            if name in row:
+                slopes[row[name]] += analytic[short]
+    elif varied:
+        by_value = differences(model, varied, lambda values: respond(values_for_effect(branch, values), *test))[1]
+        slopes[[row[name] for name in varied]] += by_value
+
+
+def _differences_at(
+    place: Place, model: Model, names: Sequence[str], respond: Callable[..., Array]
+) -> tuple[Array, Array]:
+    """Response of a model in one direction and its derivatives by one-sided differences.
+
+    Derivatives by parameters of other directions, such as `stiffness_factor.radial`, are 0 and are not computed.
+
+    Args:
+        place: direction or specimen of the response.
+        model: model; the derivatives are taken at its parameter values.
+        names: names of k parameters.
+        respond: function of the keyword argument `values`, parameter values, that gives the response.
 
     Returns:
-        Response without a step, (n,), and its derivatives per SI unit of each parameter, (k, n).
+        Response, (n,), and its derivatives per SI unit of each parameter, (k, n).
     """
-    has_row = steps != 0.0
-    responses = np.broadcast_to(responses, (int(has_row.sum()) + 1, responses.shape[-1]))
-    slopes = np.zeros((steps.size, responses.shape[-1]), dtype=responses.dtype)
-    slopes[has_row] = (responses[:-1] - responses[-1]) / steps[has_row, None]
-    return responses[-1], slopes
+    labels = place.labels if isinstance(place, Specimen) else (str(place),)
+    local = [i for i, name in enumerate(names) if place_suffix(name) in (None, *labels)]
+    response, local_slopes = differences(model, [names[i] for i in local], lambda values: respond(values=values))
+    slopes = np.zeros((len(names), response.size), dtype=response.dtype)
+    slopes[local] = local_slopes
+    return response, slopes
+
+
+def differences(model: Model, names: Sequence[str], respond: Callable[[Values], Array]) -> tuple[Array, Array]:
+    """Response of a model and its derivatives by parameters, by one-sided differences that stay inside the bounds.
+
+    Args:
+        model: model; the derivatives are taken at its parameter values.
+        names: names of k parameters.
+        respond: function from parameter values to the response, (..., n), called once; the values are arrays of shape
+            (k + 1, 1).
+
+    Returns:
+        Response, (n,), and its derivatives per SI unit of each parameter, (k, n).
+    """
+    count = len(names)
+    stacked: dict[str, Value] = dict(model.values)
+    steps = np.empty((count, 1))
+    for i, name in enumerate(names):
+        parameter, value = model.parameters[name], model.values[name]
+        step = _RELATIVE_STEP * (abs(value) if parameter.log and value else parameter.typical)
+        column = np.full((count + 1, 1), value)
+        column[i] += step if value + step <= parameter.bounds[1] else -step
+        stacked[name], steps[i] = column, column[i] - value
+    responses = respond(cast(Values, stacked))
+    responses = np.broadcast_to(responses, (count + 1, responses.shape[-1]))
+    return responses[count], (responses[:count] - responses[count]) / steps

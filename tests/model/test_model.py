@@ -14,13 +14,13 @@ from scipy.stats import t
 
 from bushfit import effects, geometry, model, reduction
 from bushfit.effects import History
-from bushfit.effects.contract import Array, Setting
+from bushfit.effects.contract import Array, Setting, Values
 from bushfit.geometry import Direction
 from bushfit.model import rig
 from bushfit.model.covariance import Z95, Covariance
 from bushfit.model.file import from_document, to_document
 from bushfit.model.model import FIVE
-from bushfit.model.sensitivity import force_and_slopes, stepped_values, stiffness_and_slopes
+from bushfit.model.sensitivity import differences, force_and_slopes, stiffness_and_slopes
 
 PACKAGES = (effects, geometry, model, reduction)
 FREQUENCY = np.array([0.1, 5.0, 55.0, 155.0])
@@ -69,17 +69,28 @@ def test_the_examples_are_right(name, paper_model):
     assert done.attempted or not name.startswith("bushfit.effects.")
 
 
-def test_differences_stay_within_the_bounds(paper_model):
+def test_analytic_derivatives_are_used_and_agree_with_the_differences(paper_model, monkeypatch):
+    at = ("axial", FREQUENCY, AMPLITUDE)
+    _, by_differences = differences(paper_model, FIVE, lambda values: paper_model.stiffness(*at, values=values))
+    monkeypatch.setattr("bushfit.model.sensitivity.differences", None)
+    _, analytic = stiffness_and_slopes(paper_model, *at, FIVE)
+    np.testing.assert_allclose(analytic, by_differences, rtol=1e-5, atol=1e-5 * np.abs(analytic).max(axis=1).min())
+    assert np.array_equal(stiffness_and_slopes(paper_model, *at, ("eps_half", "mu"))[1], analytic[[4, 0]])
+
+
+def test_one_sided_at_a_bound(paper_model):
     """alpha = 1 may not be exceeded; the neutral mass 0 may be left both ways or one."""
     edge = paper_model.with_values({"alpha": 1.0})
-    values, _ = stepped_values(edge, Direction.AXIAL, ["alpha"])
-    assert np.max(values["alpha"]) == 1.0
-    turn = 2j * np.pi * FREQUENCY
-    slope = stiffness_and_slopes(edge, Direction.AXIAL, FREQUENCY, AMPLITUDE, ["alpha"])[1][0]
-    shape = edge.stiffness_per_modulus(Direction.AXIAL)
-    np.testing.assert_allclose(slope, shape * 0.5 * edge.values["m"] * turn * np.log(turn), rtol=1e-5)
+    at = ("axial", FREQUENCY, AMPLITUDE)
+
+    def respond(values: Values) -> Array:
+        assert np.max(values["alpha"]) <= 1.0
+        return edge.stiffness(*at, values=values)
+
+    _, found = differences(edge, ["alpha"], respond)
+    np.testing.assert_allclose(found, stiffness_and_slopes(edge, *at, ["alpha"])[1], rtol=1e-4)
     heavy = paper_model.with_effect("inertia")
-    slope = stiffness_and_slopes(heavy, Direction.AXIAL, FREQUENCY, AMPLITUDE, ["inertia.mass"])[1][0]
+    slope = stiffness_and_slopes(heavy, *at, ["inertia.mass"])[1][0]
     np.testing.assert_allclose(slope, -((2.0 * np.pi * FREQUENCY) ** 2), rtol=1e-6, atol=1e-2)
 
 
@@ -100,7 +111,7 @@ def test_slopes_under_a_compliant_rig_hold_however_near_the_last_model_was(paper
         force, model.force(Direction.AXIAL, exact, kind="loop"), rtol=0.0, atol=1e-7 * force.max()
     )
     for name, slope in zip(names, slopes, strict=True):
-        expected = force_and_slopes(model, Direction.AXIAL, replace(exact, solved={}), [name])[1]
+        expected = differences(model, [name], lambda values: model.force("axial", exact, kind="loop", values=values))[1]
         off = np.abs(slope - expected[0]).max() / np.abs(expected).max() if np.any(expected) else np.abs(slope).max()
         assert off < 1e-3
 
