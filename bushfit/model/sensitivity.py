@@ -47,7 +47,8 @@ def stiffness_and_slopes(
     Returns:
         Complex stiffness [N/m or N m/rad], (n,), and its derivatives per SI unit of each parameter, (k, n).
 
-    >>> _, slopes = stiffness_and_slopes(paper, Direction.AXIAL, np.array([5.0]), np.array([1e-4]), ["mu"])
+    >>> axial = paper.setting("axial").direction
+    >>> _, slopes = stiffness_and_slopes(paper, axial, np.array([5.0]), np.array([1e-4]), ["mu"])
     >>> slopes.round(4)
     array([[0.3634+0.j]])
     """

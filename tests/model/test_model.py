@@ -70,7 +70,7 @@ def test_the_examples_are_right(name, paper_model):
 
 
 def test_analytic_derivatives_are_used_and_agree_with_the_differences(paper_model, monkeypatch):
-    at = ("axial", FREQUENCY, AMPLITUDE)
+    at = (Direction.AXIAL, FREQUENCY, AMPLITUDE)
     _, by_differences = differences(paper_model, FIVE, lambda values: paper_model.stiffness(*at, values=values))
     monkeypatch.setattr("bushfit.model.sensitivity.differences", None)
     _, analytic = stiffness_and_slopes(paper_model, *at, FIVE)
@@ -81,7 +81,7 @@ def test_analytic_derivatives_are_used_and_agree_with_the_differences(paper_mode
 def test_one_sided_at_a_bound(paper_model):
     """alpha = 1 may not be exceeded; the neutral mass 0 may be left both ways or one."""
     edge = paper_model.with_values({"alpha": 1.0})
-    at = ("axial", FREQUENCY, AMPLITUDE)
+    at = (Direction.AXIAL, FREQUENCY, AMPLITUDE)
 
     def respond(values: Values) -> Array:
         assert np.max(values["alpha"]) <= 1.0
