@@ -39,7 +39,7 @@ class DiagnosisSettings:
     """Settings of a diagnosis: the options of the command diagnose.
 
     Args:
-        max_effects: maximum number of added effects.
+        max_effects: maximum number of added effects, adopted ones included; one may be added in any case.
         tolerance: gap, relative to |K| (or to half a loop's force range), up to which an explanation is neglected.
         adopt: names of effects to add, and of mistakes to correct, whatever the evidence.
         without: names of effects (with their twins) and mistakes not to consider.

@@ -25,7 +25,7 @@ from bushfit.diagnosis.refit import refitted
 from bushfit.diagnosis.rig_errors import in_scatter_units
 from bushfit.diagnosis.verdict import decide_verdict
 from bushfit.effects.contract import Array
-from bushfit.effects.mistakes import USUAL_MODULUS
+from bushfit.effects.mistakes import USUAL_MODULUS, get_mistake
 from bushfit.errors import FitError, ModelError
 from bushfit.geometry import stiffness_per_modulus
 from bushfit.model.model import Model
@@ -97,7 +97,9 @@ class Search:
 
     def _may_grow(self, state: SearchState) -> bool:
         """True if a further effect may be added to a state."""
-        return len(state.effects) < self.request.settings.max_effects
+        settings = self.request.settings
+        adopted = sum(get_mistake(name) is None for name in settings.adopt)
+        return len(state.effects) < max(settings.max_effects - adopted, min(settings.max_effects, 1))
 
     def _ordered(self) -> list[Hypothesis]:
         """Hypotheses about the gap that the search has recorded so far, the most probable first."""

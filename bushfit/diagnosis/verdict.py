@@ -108,7 +108,7 @@ def decide_verdict(hypotheses: Sequence[Hypothesis], tolerance: float, *, gap_st
     unnamed = sum(composition.probability for composition in likely if composition.unnamed)
     certain = common | {"unnamed"} if unnamed > 0.5 else common
     alone = next((composition for composition in likely if composition.parts == certain), None)
-    if alone:  # all that is probable has these parts; the tests show no other part, but that there is one
+    if alone is first:  # all that is probable has these parts; the tests show no other part, but that there is one
         rivals = (composition for composition in likely if composition is not alone)
         return replace(_single(alone, nothing, leads), reported=(alone, *rivals))
     reported = tuple(likely[:MOST_REPORTED])
