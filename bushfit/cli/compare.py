@@ -52,7 +52,8 @@ def command(
     interval. With --families, the command instead fits several models to one campaign, and compares how well each
     model fits the tests and how well it predicts tests that were left out of its fit.
 
-    Writes compare.json, parameters.csv, differences.csv, compare.png, compare.html; with --families families.csv.
+    Writes compare.json, parameters.csv, differences.csv, compare.png and compare.html. With --families, it also writes
+    families.csv.
     """
     from bushfit.campaign.campaign import Campaign, load_campaign
     from bushfit.commands.compare import MOST, compare, compared_result

@@ -17,7 +17,7 @@ _MOST_TESTS = 8
 
 
 def print_validations(output: Output, validations: Sequence[Validation], before: Sequence[Validation] = ()) -> None:
-    """Print NRMSE, gap of peak and energy, and share of points in the 95 % band for each validation record.
+    """Print, for each validation record, the misfit of the predicted force, and the share of points in its 95 % band.
 
     Args:
         output: output of the command.
@@ -74,7 +74,8 @@ def print_tests(output: Output, misfits: Sequence[Misfit], usable: Sequence[Expe
 
     Args:
         output: output of the command.
-        misfits: NRMSE, reduced chi-square and mean gap of |K| of each test and run.
+        misfits: NRMSE, reduced chi-square, and mean relative difference of |K| (measured minus model) of each test and
+            run.
         usable: expected error of |K| and loss factor of each direction or specimen.
     """
     from bushfit.report.tables import DISPLAYS

@@ -43,11 +43,11 @@ if TYPE_CHECKING:
 def command(source: Path, effects: tuple[str, ...], output: Output, **settings: Any) -> None:
     """Simulate the tests of a model on a virtual rig and write them as a campaign.
 
-    With CAMPAIGN, its [simulate] table states the model and the tests. With MODEL.json, the tests are those of the
-    paper's bushing. Use simulate to check whether `bushfit diagnose` would find an effect that you add with --effect.
-    The equations are solved step by step in time, independently of the formulas that the fits use. Radial
-    tests follow the paper's formula. If `bushfit init` shall read the tests, set shape = "calibrated" in [bushing], as
-    init does.
+    With CAMPAIGN, its [simulate] table states the model and the tests. With MODEL.json, this model is simulated in the
+    paper's test programme. Use simulate to check whether `bushfit diagnose` would find an effect that you add with
+    --effect. The equations are solved step by step in time, independently of the formulas that the fits use. Radial
+    tests follow the paper's formula; for a campaign that `bushfit init` writes from them, set shape = "calibrated" in
+    [bushing] of CAMPAIGN before the simulation, because init sets it, too.
 
     Writes campaign.toml, its test files, and truth.json (the model that was simulated).
     """

@@ -88,7 +88,11 @@ class Claim:
         )
 
     def corrected(self) -> PreparedCampaign:
-        """Campaign in which the mistake is corrected, in the tests or in the dimensions of the bushing."""
+        """Correct the mistake, in the tests or in the dimensions of the bushing.
+
+        Returns:
+            The corrected campaign.
+        """
         data = self.data
         if not self.tests:
             bushing = data.campaign.bushing and self.mistake.corrected_bushing(data.campaign.bushing)

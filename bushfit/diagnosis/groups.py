@@ -42,10 +42,10 @@ class Group:
 
     @property
     def scaled(self) -> Array:
-        """Changes of all n residuals for the computation of evidence, (c, n).
+        """Changes of all n residuals by the c columns, scaled for the prior of their amounts, (c, n).
 
-        If exactly one column acts, each is that of a change of |K| by 100 %; a column that does not change |K| becomes
-        zero.
+        If the columns are alternatives, each is divided by its change of |K|, so that an amount of 1 changes |K| by
+        100 %, and is zero if it does not change |K|. Columns that act together are not scaled.
         """
         if self.act_together:
             return self.whole

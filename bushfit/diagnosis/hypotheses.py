@@ -219,6 +219,9 @@ class SearchState:
             name: name of the effect.
             evidence: fit with the effect.
             log_odds: natural log of the prior odds of the effect.
+
+        Returns:
+            State with the effect, the fit, and the prior of the effect's parameters.
         """
         log_density, precision, change = laplace(name, evidence, self.evidence)
         return replace(

@@ -288,10 +288,11 @@ def _absolute_difference(modelled: Array, measured: Array) -> Array:
 
 
 def _runs(test: MeasuredTest) -> Iterator[tuple[dict[str, Any], Array]]:
-    """Yield the runs of a test, one for each constant amplitude or frequency; one for a loop or a sweep without.
+    """Yield the runs of a test: the points of a sweep at each constant amplitude or frequency.
 
     Yields:
-        Name ("held"), value and unit of the constant quantity, and the mask of the points of the run, (n,).
+        Constant quantity of the run, with the keys held (its name), value and unit; and the mask of the points of the
+        run, (n,). A loop, and a sweep without a constant quantity, are one run with no keys.
     """
     if not isinstance(test, MeasuredSweep) or test.sweep.stepped is None:
         yield {}, np.ones(test.frequency.size, dtype=bool)

@@ -63,7 +63,7 @@ class MeasuredLoop(MeasuredBase):
 
     @property
     def notes(self) -> Sequence[str]:
-        """Sentences for the user on left-out parts or a preload of the record, and on contradictory tests."""
+        """Sentences for the user: left-out parts of the record, a preload, or a contradiction between loops."""
         return [*self.prepared.notes, *([self.contradiction] if self.contradiction else [])]
 
     @property
@@ -229,7 +229,12 @@ class MeasuredLoop(MeasuredBase):
         return self.prepared.outliers["force"].rows
 
     def outliers(self, points: Array, model: Model) -> Iterator[Outlier]:
-        """Yield file, row and distance of the outliers of a sweep with indices `points`, or of all those of a loop."""
+        """Yield all rows of the loop that are far from its harmonics, with the distance in units of noise.
+
+        Args:
+            points: not used for a loop.
+            model: not used for a loop.
+        """
         file = str(self.source.file) if self.source else None
         before = self.prepared.first_row + (self.test.part.first_row if self.test.part else 0)
         for column, (rows, distance) in self.prepared.outliers.items():

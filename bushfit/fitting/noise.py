@@ -260,7 +260,7 @@ def _pair(values: Array) -> tuple[float, float]:
 
 
 def _unequal(lines: Sequence[LineNoise]) -> bool:
-    """True if Bartlett's test (1937) finds unequal scatter in the lines of sweeps; gain and phase are averaged."""
+    """True if runs of sweeps scatter unequally, by Bartlett's test (1937) of the mean variance of gain and phase."""
     variance = np.array([line.variance.mean() for line in lines])
     freedom = np.array([2.0 * line.freedom for line in lines])
     if variance.size < 2 or not variance.all():

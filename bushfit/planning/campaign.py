@@ -51,7 +51,11 @@ def simulation_settings(tests: Sequence[Test], noise: Noise) -> SimulateSettings
 
 
 def campaign_toml(plan: Plan) -> str:
-    """Format the planned tests as a campaign file in TOML for `bushfit simulate`, with the model of the plan."""
+    """Format the planned tests as a campaign for `bushfit simulate`, with the model of the plan.
+
+    Returns:
+        Content of the campaign file, in TOML.
+    """
     knowledge, settings = plan.knowledge, simulation_settings(plan.planned.tests, plan.knowledge.noise)
     tested = [test.direction for test in plan.planned.tests]
     lines = [

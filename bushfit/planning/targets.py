@@ -66,6 +66,9 @@ class PlannedQuantity:
         Args:
             knowledge: model, covariance and noise before the planned tests.
             grid: operating points of one direction.
+
+        Returns:
+            Planned stiffness, then planned loss factor.
         """
         exact = replace(knowledge.result or Result(knowledge.model), covariance=Covariance())
         prediction = predict(exact, grid.place, grid.frequencies, grid.amplitudes)

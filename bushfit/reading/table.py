@@ -80,7 +80,11 @@ class Table(Cells):
         return tuple(sentences)
 
     def quantity_above(self, unit: str) -> str | None:
-        """Return the only quantity with the dimension of an SI unit behind = or : in the lines above the table."""
+        """Find a quantity such as "0.2 mm" in the lines above the table, where it follows = or :.
+
+        Returns:
+            Number and unit as text; None if no quantity, or several, have the dimension of the SI unit `unit`.
+        """
         matches = (match for line in self.lines_above for match in _QUANTITY.finditer(line.text))
         matches = (match for match in matches if units.is_compatible(match[2], unit))
         texts = dict.fromkeys(f"{match[1].replace(',', '.')} {match[2]}" for match in matches)
@@ -192,7 +196,7 @@ class Table(Cells):
             return replace(column, scale=strain_factor * units.si_factor(unit, expected))
 
     def agrees(self, role: str, expected: str) -> bool:
-        """True if there is a column for a role such as "force", in a unit compatible with `expected`, or 1."""
+        """True if there is a column for a role such as "force", whose unit has the dimension of the unit `expected`."""
         column = self.roles.get(role)
         return column is not None and units.is_compatible(column.unit or "1", expected)
 
