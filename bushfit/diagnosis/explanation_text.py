@@ -101,7 +101,7 @@ def explanation_odds(finding: Finding) -> Odds:
         fits.append((evidence.model, evidence.covariance_of(evidence.model.values)) if shown else None)
     pairs = tuple(zip(sentences, (composition.probability for composition in compositions), strict=True))
     labels = tuple(label(composition) for composition in compositions)
-    return Odds(finding.nothing, pairs, tuple(fits), labels, finding.verdict == "ambiguous")
+    return Odds(finding.nothing, pairs, tuple(fits), labels, finding.verdict in ("ambiguous", "partly"))
 
 
 def list_candidates(

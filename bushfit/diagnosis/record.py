@@ -112,7 +112,8 @@ class Odds:
         fits: fitted model of each explanation, with its covariance; None for the explanation of the result, and for an
             explanation that was not fitted.
         labels: names of the effects, mistakes and faults of each explanation, joined by " + ".
-        are_alternatives: True if the tests cannot decide between the explanations, so that each is an alternative.
+        are_alternatives: True if bands include the fits: of explanations that the tests cannot decide between, and of
+            rivals of the explanation of a part of the gap.
     """
 
     nothing: float
