@@ -36,6 +36,7 @@ _FORMAT_OPTIONS: dict[Written, Parameter] = {
         type=click.Choice(get_args(Form)),
         default="csv",
         envvar="BUSHFIT_TABLE_FORMAT",
+        show_envvar=True,  # in the error of a wrong value
     ),
     "pictures": option(
         "--plot-format FORM",
@@ -44,6 +45,7 @@ _FORMAT_OPTIONS: dict[Written, Parameter] = {
         multiple=True,
         default=["png"],
         envvar="BUSHFIT_PLOT_FORMAT",
+        show_envvar=True,  # in the error of a wrong value
     ),
     "pages": flag("--no-report", "Do not write the HTML report."),
 }
