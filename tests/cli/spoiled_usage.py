@@ -109,7 +109,7 @@ USAGE = [
     ("reduce|shaker.csv|--mass|0.5 kg|--direction|torsion", "shaker.csv: a mass resists no rotation", "a translation"),
     ("reduce|shaker.csv|--mass|0.5 kg|--direction|axial|--levels|0.1 mm", "shaker.csv: a resonance test is reduced by itself", "no levels"),
     ("reduce|shaker.csv|shaker.csv|--mass|0.5 kg|--direction|axial", "shaker.csv: a resonance test is reduced by itself", "each of them, with its own mass"),
-    ("reduce|shaker.csv|--mass|0.5 kg|--direction|axial|--base-acceleration|0.1 g", "shaker.csv: the acceleration of the base is stated twice", "leave --base-acceleration out"),
+    ("reduce|shaker.csv|--mass|0.5 kg|--direction|axial|--base-acceleration|0.1 g", "the acceleration of the base is stated twice", "leave --base-acceleration out"),
     ("reduce|shaker.csv|--mass|0.5 kg|--direction|axial|--base-acceleration|5 mm", "--base-acceleration: the unit does not fit", "an acceleration, such as m/s^2"),
     ("reduce|shaker.csv|--mass|0.5 kg|--direction|axial|--column|mass_acceleration=Ch2", 'shaker.csv, line 1: there is no column "Ch2"', "the header that was stated for the mass acceleration"),
     ("reduce|loop.csv|--mass|0.5 kg|--direction|axial", "loop.csv, line 1: the columns give no complex transmissibility", '--column "mass_acceleration=..."'),
