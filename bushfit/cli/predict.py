@@ -93,6 +93,7 @@ def command(
     from bushfit.commands.loading import load_model, model_file
     from bushfit.commands.predict import predict
     from bushfit.commands.provenance import input_files
+    from bushfit.units import si_factor
 
     result, loaded = load_model(model), load_campaign(campaign) if campaign else None
     if (mass is None) != (base_acceleration is None):
@@ -104,7 +105,8 @@ def command(
     for resonance in predicted.resonances:
         frequency, largest = resonance.peak
         peak = f"resonance at {frequency:.4g} Hz, |T| {largest:.3g}"
-        shaken = f"{resonance.mass:.4g} kg, base acceleration {resonance.base_acceleration:.4g} m/s^2"
+        acceleration = resonance.base_acceleration / si_factor("g", "m/s^2")
+        shaken = f"{resonance.mass:.5g} kg, base acceleration {acceleration:.4g} g"
         output.print(f"{resonance.place} with a mass of {shaken}: {peak}")
     for curve in predicted.static:
         _print_static(output, curve)

@@ -115,7 +115,7 @@ def unpivot(source: RowSource, file: Path, vocabulary: Vocabulary, layout: Layou
         return first if is_row(texts) and is_like_number(texts[first]) else None
 
     cells = [(line.number, cells_of(line, mark)) for line in source.head() if not is_comment(line.content, mark)]
-    width = max(len(row) for _, row in cells)
+    width = max((len(row) for _, row in cells), default=0)
     lines = [Line(number, [*row, *[""] * (width - len(row))]) for number, row in cells]
     columns, texts = list[_WideColumn](), list[str]()
     for above, rows in find_segments(lines, first_number, fewest_rows=2):
