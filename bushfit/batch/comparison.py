@@ -13,8 +13,8 @@ from bushfit.model.covariance import Z95
 FEWEST = 5
 #: Probability that any part of a batch of equal parts is reported as an outlier.
 _LEVEL = 0.05
-#: Number of parts for each that may be an outlier: two of eight do not hide each other.
-_LARGEST_SHARE = 4
+#: Number of parts for each part that may be an outlier: two of eight do not hide each other.
+_PARTS_PER_OUTLIER = 4
 
 
 def find_outliers(quantities: Mapping[str, tuple[Array, Array]]) -> tuple[dict[str, Array], dict[str, Array]]:
@@ -38,7 +38,7 @@ def find_outliers(quantities: Mapping[str, tuple[Array, Array]]) -> tuple[dict[s
     for name, (values, errors) in quantities.items():
         usual = np.isfinite(values)
         removed, outlier_count = list[int](), 0
-        for step in range(int(usual.sum()) // _LARGEST_SHARE):
+        for step in range(int(usual.sum()) // _PARTS_PER_OUTLIER):
             z = _studentised(values, errors, usual)
             if not np.isfinite(z[usual]).any():  # the others agree to the digit
                 break

@@ -15,7 +15,7 @@ from bushfit.model.result import Result
 from bushfit.model.sensitivity import force_and_slopes
 from bushfit.prediction.bands import Band, envelope, uncertainty
 from bushfit.prediction.caveats import BEYOND, MARGIN, extrapolations, unfitted_warnings
-from bushfit.prediction.superposed import timed_candidates
+from bushfit.prediction.superposed import correction_factor, timed_candidates
 from bushfit.reduction.displacement import noise_and_highest_frequency
 from bushfit.units import number
 
@@ -182,11 +182,9 @@ def _corrected(force: Array, model: Model, place: Place, history: History, condi
     frequency = np.fft.rfftfreq(samples, history.step)[1:]
     grid = np.geomspace(frequency[0], frequency[-1], _CORRECTED)
     amplitude = np.maximum(np.sqrt(2.0) * np.std(history.value), np.finfo(float).eps)
-    with_it, without = (
-        source.stiffness(place, grid, amplitude, conditions=conditions) for source in (model, model.without(UNNAMED))
-    )
+    factor = correction_factor(model, place, grid, amplitude, conditions)
     spectrum = np.fft.rfft(force, samples)
-    spectrum[1:] *= np.interp(np.log(frequency), np.log(grid), with_it / without)
+    spectrum[1:] *= np.interp(np.log(frequency), np.log(grid), factor)
     return np.fft.irfft(spectrum, samples)[: force.size]
 
 

@@ -118,9 +118,27 @@ def superposed_stiffness_and_slopes(
         columns.append(spectrum[1:] / spectrum[0])
     response = np.array(columns).T
     if model.unnamed:
-        corrected = model.stiffness(place, frequency, amplitude, conditions=conditions)
-        response *= corrected / named.stiffness(place, frequency, amplitude, conditions=conditions)
+        response *= correction_factor(model, place, frequency, amplitude, conditions)
     return response[0], response[1:]
+
+
+def correction_factor(
+    model: Model, place: Place, frequency: Array, amplitude: Array, conditions: RubberConditions
+) -> Array:
+    """Complex factor by which the unnamed correction of a model multiplies its stiffness in a sine, (n,).
+
+    Args:
+        model: model with the correction.
+        place: direction or specimen.
+        frequency: frequency [Hz], (n,).
+        amplitude: zero-to-peak amplitude [m, rad or 1], (n,) or a single number.
+        conditions: temperature and preload of the rubber.
+    """
+    corrected, without = (
+        source.stiffness(place, frequency, amplitude, conditions=conditions)
+        for source in (model, model.without(UNNAMED))
+    )
+    return np.asarray(corrected / without)
 
 
 def untimed_effects(model: Model) -> list[str]:
