@@ -12,6 +12,7 @@ from bushfit.diagnosis.record import MisfitRegion
 from bushfit.effects.contract import Array
 from bushfit.fitting.line_misfit import LineMisfit, line_misfits
 from bushfit.fitting.preparation import split_by_kind
+from bushfit.reading.preload import add_preload
 from bushfit.units import number
 
 #: Smallest smooth misfit (root mean square, in units of its noise) of a region that is listed.
@@ -161,14 +162,15 @@ def _loop_regions(evidence: Evidence) -> Iterator[MisfitRegion]:
         if share < _LEAST:
             continue
         unit, factor = data_set.direction.display.displacement
+        frequency = data_set.prepared.frequency
+        loop = f"the {data_set.direction} loop of {amplitude * factor:.3g} {unit} at {frequency:.3g} Hz"
         yield MisfitRegion(
             data_set.direction,
             "loop",
-            (data_set.prepared.frequency,) * 2,
+            (frequency,) * 2,
             (amplitude,) * 2,
             "force",
             float(np.sqrt(np.mean(np.square(amounts)))),
-            f"the {data_set.direction} loop of {amplitude * factor:.3g} {unit} at {data_set.prepared.frequency:.3g} Hz "
-            "differs from the model most in "
+            f"{add_preload(loop, data_set.test.preload, data_set.direction)} differs from the model most in "
             f"{_HARMONICS.get(order, f'harmonic {order}')}: {number(100 * share, 2)} % of half its force range",
         )

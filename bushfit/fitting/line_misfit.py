@@ -13,6 +13,7 @@ from bushfit.fitting.repeats import to_unit_interval
 from bushfit.geometry import Place
 from bushfit.model.model import Model
 from bushfit.reading.measurement import Stepped
+from bushfit.reading.preload import Preload, add_preload
 
 #: Degree of the Legendre polynomials, in the logarithm of the stepped quantity, that represent smooth misfit.
 _SMOOTH_DEGREE = 3
@@ -25,6 +26,7 @@ class LineMisfit:
     Args:
         name: name of the test.
         direction: direction or specimen of the test.
+        preload: preload of the test; None if it is unknown.
         stepped: quantity that varies along the line, "frequency" or "amplitude"; None if neither is held.
         frequency: frequency of each point [Hz], (n,).
         amplitude: zero-to-peak amplitude of each point [m or rad], (n,).
@@ -34,6 +36,7 @@ class LineMisfit:
 
     name: str
     direction: Place
+    preload: Preload | None
     stepped: Stepped | None
     frequency: Array
     amplitude: Array
@@ -47,10 +50,11 @@ class LineMisfit:
 
     @property
     def label(self) -> str:
-        """Text of the constant amplitude or frequency of the line, "0.1 mm" or "10 Hz"; else the name of the test."""
+        """Text of the held amplitude or frequency and preload, "0.1 mm" or "10 Hz"; else the name of the test."""
+        held = f"{self.frequency[0]:.4g} Hz" if self.stepped else self.name
         if self.stepped == "frequency":
-            return shown_amplitude(self.direction, float(self.amplitude[0]))
-        return f"{self.frequency[0]:.4g} Hz" if self.stepped else self.name
+            held = shown_amplitude(self.direction, float(self.amplitude[0]))
+        return add_preload(held, self.preload, self.direction)
 
     @cached_property
     def smooth(self) -> Array:
@@ -75,4 +79,5 @@ def line_misfits(sweep: MeasuredSweep, model: Model) -> Iterator[LineMisfit]:
         variance = np.square(sweep.noise.random[sweep.name, float(held_value)]) + np.square(sweep.noise.shared)
         noise = np.sqrt(variance / np.median(counts) + np.square(sweep.noise.level))
         frequency, amplitude = (values[mask][first] for values in (sweep.frequency, sweep.amplitude))
-        yield LineMisfit(sweep.name, sweep.direction, sweep.sweep.stepped, frequency, amplitude, mean, noise)
+        held = sweep.name, sweep.direction, sweep.sweep.preload, sweep.sweep.stepped
+        yield LineMisfit(*held, frequency, amplitude, mean, noise)

@@ -1,12 +1,13 @@
 """Preload as a variable of the model: whether the tests of a direction show that it has an influence.
 
 A direction with tests at three preloads or more determines the six parameters of the effect `preload`; two preloads
-determine a straight line. An F-test decides between the model with and without them: noise, errors of levels and gain
+determine three of them. An F-test decides between the model with and without them: noise, errors of levels and gain
 errors of loops alone may not explain the difference.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -14,13 +15,15 @@ from typing import TYPE_CHECKING
 from scipy.special import fdtrc
 
 from bushfit.campaign.schema import ParameterSetting
-from bushfit.fitting.assess import preload_ranges
+from bushfit.fitting.assess import covariance, preload_ranges
 from bushfit.fitting.levels import level_errors
 from bushfit.fitting.preparation import MeasuredTest, split_by_kind, with_gain_weighting, with_level_errors
 from bushfit.fitting.problem import FitProblem, FitResult
 from bushfit.fitting.rig_class import largest_error
 from bushfit.fitting.robust import estimate
-from bushfit.geometry import get_place
+from bushfit.geometry import STRAINING, Place, get_place
+from bushfit.model.result import Alternative, PreloadRange
+from bushfit.reading.preload import SAME_PRELOAD
 from bushfit.units import number
 
 if TYPE_CHECKING:
@@ -28,10 +31,14 @@ if TYPE_CHECKING:
 
 #: Name of the effect.
 PRELOAD = "preload"
-#: Parameters that two preloads leave open: a line is neutral in them.
-_CURVATURES = ("preload.c3", "preload.friction_square", "preload.rate_square")
+#: Parameters of the influence that changes its sign with the preload, which a symmetric bushing does not have.
+_ODD = ("preload.c2", "preload.friction", "preload.rate")
+#: Parameters of the influence that is the same for both senses of the preload.
+_EVEN = ("preload.c3", "preload.friction_square", "preload.rate_square")
 #: Probability of chance below which an influence is claimed; chosen: one campaign in a hundred without an influence.
 _CHANCE = 0.01
+#: 95 % quantile of chi-square with one degree of freedom.
+_CHI_SQUARE_95 = 3.84
 
 
 def with_preload(data: PreparedCampaign) -> PreparedCampaign:
@@ -48,7 +55,12 @@ def with_preload(data: PreparedCampaign) -> PreparedCampaign:
     if PRELOAD in data.effects or not ranges:
         return data
     fit, notes, has_influence = data.campaign.fit, list[str](), False
-    fixed = _CURVATURES if max(tested.count for tested in ranges) == 2 else ()
+    fixed: Sequence[str] = ()
+    line = "square of the preload, because the bushing is symmetric"
+    if max(tested.count for tested in ranges) == 2:
+        fixed = _ODD
+        if not all(_is_symmetric(tested, get_place(tested.place, data.campaign.specimens)) for tested in ranges):
+            fixed, line = _EVEN, "preload"
     for tested in ranges:
         place = get_place(tested.place, data.campaign.specimens)
         tests = [test for test in data.data_sets if test.direction == place and test.conditions.preload]
@@ -63,14 +75,48 @@ def with_preload(data: PreparedCampaign) -> PreparedCampaign:
         has_influence = True
         if tested.count == 2:
             notes.append(
-                f"{listed}: the model follows a straight line over two preloads, and no test shows whether it is "
+                f"{listed}: the model follows a straight line over the {line}, and no test shows whether it is "
                 "straight; add tests at a third preload between them"
             )
     if not has_influence:
         return replace(data, preload_notes=tuple(notes))
-    line = {name: ParameterSetting(value=0.0, vary=False) for name in fixed}
-    fit = replace(fit, effects=(*fit.effects, PRELOAD), parameters={**line, **fit.parameters})
+    absent = {name: ParameterSetting(value=0.0, vary=False) for name in fixed}
+    fit = replace(fit, effects=(*fit.effects, PRELOAD), parameters={**absent, **fit.parameters})
     return replace(data, campaign=replace(data.campaign, fit=fit), preload_notes=tuple(notes))
+
+
+def other_line(found: FitResult) -> tuple[Alternative, ...]:
+    """Fit whose friction and springpot follow the other line: over the preload instead of its square, or the reverse.
+
+    Args:
+        found: fit with the effect of preload.
+
+    Returns:
+        The fit as an alternative, if the tests have only two preloads and do not rule it out, that is, if its
+        chi-square exceeds that of `found` by less than 3.84 (95 % of chance); else nothing.
+
+    Notes:
+        By symmetry friction is the same for both senses of a preload, but this leaves open how it grows: a line over
+        the preload and one over its square are the slow and the fast course between two preloads.
+    """
+    other = dict(zip((*_ODD[1:], *_EVEN[1:]), (*_EVEN[1:], *_ODD[1:]), strict=True))
+    free = {name for name in found.names if name in other}
+    if not free or free & {other[name] for name in free}:
+        return ()
+    names = [other.get(name, name) for name in found.names]
+    model = found.model.with_values(dict.fromkeys(free, 0.0))
+    fitted = estimate(replace(found.problem, model=model, names=names))
+    if fitted.chi_square > found.chi_square + _CHI_SQUARE_95:
+        return ()
+    return (Alternative(fitted.model, 0.5, covariance(fitted.model, [fitted.stage()], None, fitted.smooth_error)),)
+
+
+def _is_symmetric(tested: PreloadRange, place: Place) -> bool:
+    """True if the influence of two preloads can be equal for both senses, as in a tube or in rubber in shear.
+
+    It is not for two preloads that differ in sense alone, or for bars in tension.
+    """
+    return place.motion is not STRAINING and not math.isclose(-tested.low, tested.high, rel_tol=SAME_PRELOAD)
 
 
 def _probability_of_chance(data: PreparedCampaign, tests: Sequence[MeasuredTest], fixed: Sequence[str]) -> float:

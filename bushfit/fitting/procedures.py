@@ -25,7 +25,7 @@ from bushfit.fitting.coordinates import Bounds, Coordinates
 from bushfit.fitting.identify import undetermined_parameters
 from bushfit.fitting.levels import level_errors
 from bushfit.fitting.model_error import model_error_warning, with_model_error
-from bushfit.fitting.preload import PRELOAD
+from bushfit.fitting.preload import PRELOAD, other_line
 from bushfit.fitting.preparation import MeasuredTest, sources, with_level_errors
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.problem import FitResult
@@ -113,7 +113,8 @@ def fit_joint(
             )
     notes += unfitted_warnings(found.model, unused, NEXT)
     usable = expected_errors(found.model, found.problem.tests, unused, found)
-    result = replace(_result(data, [found], notes=notes, unused=unused), usable=usable, model_error=error)
+    result = _result(data, [found], notes=notes, unused=unused)
+    result = replace(result, usable=usable, model_error=error, alternatives=other_line(found))
     return replace(result, profile=profile95(found, result.covariance)) if profile else result
 
 

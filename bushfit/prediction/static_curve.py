@@ -13,9 +13,9 @@ from bushfit.model.result import Result
 from bushfit.model.sensitivity import force_and_slopes
 from bushfit.prediction.bands import Band, envelope, uncertainty
 from bushfit.prediction.caveats import extrapolations
-from bushfit.prediction.stiffness import preload_label, tested_preload
+from bushfit.prediction.stiffness import tested_preload
 from bushfit.prediction.superposed import timed_candidates
-from bushfit.reading.preload import Preload
+from bushfit.reading.preload import Preload, add_preload
 from bushfit.units import number
 
 #: Default rate of a model without loops, in display units per minute (10 mm/min): common in static tests of rubber.
@@ -55,7 +55,7 @@ class StaticCurve:
     @property
     def label(self) -> str:
         """Direction or specimen for users, with the preload: "axial at a preload of 500 N"."""
-        return preload_label(self.direction, self.preload)
+        return add_preload(str(self.direction), self.preload, self.direction)
 
     @property
     def rate_text(self) -> str:

@@ -32,7 +32,7 @@ from bushfit.prediction.caveats import (
     unfitted_warnings,
 )
 from bushfit.prediction.superposed import LargeMotion, superposed_stiffness_and_slopes, timed_candidates
-from bushfit.reading.preload import SAME_PRELOAD, Preload
+from bushfit.reading.preload import SAME_PRELOAD, Preload, add_preload
 from bushfit.reading.runs import nominal
 
 #: Predicted quantities.
@@ -78,13 +78,8 @@ class Prediction:
     @property
     def label(self) -> str:
         """Direction or specimen for users, with preload and large motion: "axial at a preload of 500 N"."""
-        label = preload_label(self.direction, self.preload)
+        label = add_preload(str(self.direction), self.preload, self.direction)
         return f"{label} over {self.over.describe(self.direction)}" if self.over else label
-
-
-def preload_label(place: Place, preload: Preload | None) -> str:
-    """Direction or specimen for users, with the preload of a prediction: "axial at a preload of 500 N"."""
-    return f"{place} at a preload of {preload.text(place)}" if preload else str(place)
 
 
 def predict(

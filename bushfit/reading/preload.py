@@ -42,6 +42,11 @@ class Preload(NamedTuple):
         return abs(self.value - preload.value) <= SAME_PRELOAD * max(abs(self.value), abs(preload.value))
 
 
+def add_preload(text: str, preload: Preload | None, place: Place) -> str:
+    """Add the preload, if it is known, to the text on a test or prediction: "axial at a preload of 500 N"."""
+    return f"{text} at a preload of {preload.text(place)}" if preload else text
+
+
 def parse_preload(text: str | None, place: Place) -> Preload | None:
     """Parse the preload that a campaign states for a test of a direction or specimen.
 

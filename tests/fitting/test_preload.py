@@ -150,11 +150,32 @@ def test_bands_hold_the_truth_within_the_tested_preloads(case, seeds):
     assert 0.93 <= held.mean() <= 0.99 if seeds == SEEDS else held.mean() > 0.85
 
 
-def test_two_preloads_give_a_line_with_a_warning_and_one_is_a_label():
+@pytest.mark.parametrize("preloads", [newtons(0.0, 800.0), metres(0.0, 1.5e-3), metres(5e-4, 1.5e-3)], ids=str)
+def test_two_preloads_of_a_symmetric_bushing_give_a_line_over_their_square(preloads):
+    rubber, (low, high) = Rubber(c3=8.0), preloads
+    result = joint_fit(campaign(rubber, preloads, seed=1))
+    odd = [result.model.values[f"preload.{name}"] for name in ("c2", "friction", "rate")]
+    assert odd == [0.0, 0.0, 0.0]
+    assert any("axial: 2 preloads, " in line and "straight line over the square" in line for line in result.warnings)
+    middle = Preload(0.5 * (low.value + high.value), low.unit)
+    between = predict(result, Direction.AXIAL, FREQUENCIES, AMPLITUDES, preload=middle)
+    points = zip(between.frequency, between.amplitude, strict=True)
+    true = np.array([truth(rubber, *point, middle, high.value) for point in points])
+    assert np.all(held_by_bands(between, true)[0])
+    assert np.abs(between.stiffness.value / np.abs(true) - 1.0).max() < 0.005
+
+
+def test_two_preloads_that_differ_in_sense_give_a_line_and_one_is_a_label():
+    result = joint_fit(campaign(Rubber(c2=1.0, c3=8.0), metres(-1e-3, 1e-3), seed=1))
+    even = [result.model.values[f"preload.{name}"] for name in ("c3", "friction_square", "rate_square")]
+    assert even == [0.0, 0.0, 0.0]
+    assert any("axial: 2 preloads, -1 to 1 mm: the model follows a straight line" in line for line in result.warnings)
+
+
+def test_the_course_of_friction_between_two_preloads_is_open_and_one_preload_is_a_label():
     result = joint_fit(campaign(STIFF, newtons(0.0, 800.0), seed=1))
-    curvatures = [result.model.values[f"preload.{name}"] for name in ("c3", "friction_square", "rate_square")]
-    assert curvatures == [0.0, 0.0, 0.0]
-    assert any("axial: 2 preloads, 0 to 800 N: the model follows a straight line" in line for line in result.warnings)
+    alternative = result.alternatives[0].model.values
+    assert alternative["preload.friction"] > 0.0 == alternative["preload.friction_square"]
     single = joint_fit(campaign(STIFF, newtons(800.0), seed=1))
     assert "preload" not in single.model.effects
     assert single.measured
