@@ -23,7 +23,7 @@ from scipy.special import bdtrc
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.groups import Group
 from bushfit.effects.contract import Array
-from bushfit.fitting.loop_harmonics import smooth_waves
+from bushfit.fitting.loop_harmonics import SMOOTH_HARMONICS
 from bushfit.fitting.preparation import (
     SAME_LOOP,
     MeasuredLoop,
@@ -37,6 +37,7 @@ from bushfit.geometry import Place
 from bushfit.model.model import Model
 from bushfit.model.result import Outlier
 from bushfit.reading.measurement import SAME_TEMPERATURE
+from bushfit.reduction.harmonics import basis
 
 #: Name of the compound's own deviation among explanations without a name.
 COMPOUND = "compound"
@@ -338,7 +339,7 @@ def unnamed_curves(evidence: Evidence) -> list[Explanation]:
             groups["rough all"] = Group(columns, changes, act_together=True)
     if loops:
         repeats = group_repeats(loops)
-        shapes = block_diag(*[smooth_waves(np.arange(_PHASES) / _PHASES)] * len(repeats))
+        shapes = block_diag(*[basis(np.arange(_PHASES) / _PHASES, SMOOTH_HARMONICS).T] * len(repeats))
         columns = np.concatenate([_repeat_changes(evidence, group, MeasuredLoop.smooth_changes) for group in repeats])
         groups["loops"] = Group(columns, shapes, act_together=True)
     return [Explanation("unnamed", "unnamed", name, group) for name, group in groups.items()]

@@ -155,8 +155,9 @@ def _loop_regions(evidence: Evidence) -> Iterator[MisfitRegion]:
     for data_set in loops:
         columns, amplitude = data_set.smooth_changes(), data_set.prepared.amplitude
         norms = np.maximum(np.linalg.norm(columns, axis=1), np.finfo(float).tiny)
+        first = len(columns) // 2 + 1  # of the sines, which follow the mean and the cosines
         amounts = columns @ evidence.residual[evidence.residual_rows[data_set]] / norms
-        by_order = [np.hypot(values[::2], [0.0, *values[1::2]]) for values in (amounts, amounts / norms)]
+        by_order = [np.hypot(values[:first], [0.0, *values[first:]]) for values in (amounts, amounts / norms)]
         order = int(np.argmax(by_order[0]))
         share = by_order[1][order]
         if share < _LEAST:

@@ -10,12 +10,12 @@ from bushfit.diagnosis.evidence import EVALUATIONS, Evidence
 from bushfit.effects import qualified_name
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError, ModelError
-from bushfit.fitting.common_error import CommonError
 from bushfit.fitting.coordinates import Bounds
 from bushfit.fitting.descent import Descent
 from bushfit.fitting.design import shape_start_values
 from bushfit.fitting.preparation import MeasuredTest
 from bushfit.fitting.problem import FitProblem
+from bushfit.fitting.shared_errors import SharedErrors
 from bushfit.model.model import Model
 from bushfit.progress import track
 
@@ -49,7 +49,7 @@ def refitted(
         Fits by the name of the effect; fits far behind the best, and effects without a response, are left out.
     """
     fits, tests = dict[str, Descent](), evidence.data_sets
-    shared_error = None if columns is None else CommonError(columns)
+    shared_error = None if columns is None else SharedErrors.from_columns(columns)
     for name, model in models.items():
         model = model.with_values({key: value for key, value in start.items() if key in model.values})
         limits = {**within_reach(model, tests), **bounds}  # at the start, because the gap has distorted the fit before

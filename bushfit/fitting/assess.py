@@ -99,7 +99,8 @@ def covariance(
         influence = reaction[:, equations] @ basis
         blocks = list(zip(stage.tests, residual_slices(stage.tests), strict=True))
         if smooth_error:  # beside it the error of the noise is the least part
-            added = smooth_error.covariance(model, stage.tests, influence)
+            changes = influence[:, : smooth_error.columns.shape[1]] @ smooth_error.columns.T
+            added = changes @ changes.T
             spread.append(added * np.sqrt(2.0 / smooth_error.freedom))
             matrix = matrix + added + sum(test.extra_covariance(influence[:, rows]) for test, rows in blocks)
             continue

@@ -117,6 +117,19 @@ class FittedTests:
         ]
         return np.concatenate(parts, axis=-1)
 
+    def residual_changes(self, shapes: Array) -> Array:
+        """Convert relative changes of the stiffness into changes of all n whitened residuals.
+
+        Args:
+            shapes: c relative changes of the stiffness at the operating points, complex (c, p).
+
+        Returns:
+            Changes of the residuals, (c, n).
+        """
+        ends = np.cumsum([test.frequency.size for test in self.data_sets])[:-1]
+        pairs = zip(self.data_sets, np.split(shapes * self._stiffness, ends, axis=1), strict=True)
+        return np.concatenate([test.residual_change(change, self.solution.model) for test, change in pairs], axis=-1)
+
     def columns(self, shapes: Array) -> Array:
         """Convert relative changes of the stiffness into changes of the d combinations of residuals that they alter.
 

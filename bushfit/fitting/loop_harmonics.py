@@ -269,10 +269,3 @@ def phase_bins(
     filled, place = np.unique(GRID * group[bins // GRID] + bins % GRID, return_inverse=True)
     rows, inside, total = (np.bincount(place, weights=part) for part in parts)
     return middle[filled // GRID] + (filled % GRID + inside / rows) / GRID, total / rows, rows
-
-
-def smooth_waves(phase: Array) -> Array:
-    """Constant 1, then cosine and sine of each of the first five harmonics, (11, n), at phases [cycles], (n,)."""
-    angle = 2.0 * np.pi * phase
-    waves = [wave(order * angle) for order in range(1, SMOOTH_HARMONICS + 1) for wave in (np.cos, np.sin)]
-    return np.array([np.ones_like(angle), *waves])

@@ -7,19 +7,20 @@ from typing import Any, Self
 
 import numpy as np
 
-from bushfit.effects.contract import UNKNOWN, Array, RubberConditions, Values
-from bushfit.fitting.common_error import CommonError
-from bushfit.fitting.loop_harmonics import SMOOTH_HARMONICS, smooth_waves
+from bushfit.effects.contract import Array, RubberConditions, Values
+from bushfit.fitting.loop_harmonics import SMOOTH_HARMONICS
 from bushfit.fitting.measured_test import MeasuredBase
 from bushfit.fitting.prepared_loop import PreparedLoop
+from bushfit.fitting.shared_errors import SharedErrors
 from bushfit.model.model import Model
 from bushfit.model.result import Outlier
 from bushfit.model.sensitivity import force_and_slopes, force_slopes_of_branches, stiffness_and_slopes
 from bushfit.reading.measurement import Loop
+from bushfit.reduction.harmonics import basis
 
-#: Harmonics that the model error of a loop has: alike up to the last smooth one, beyond they fall as 1/h.
+#: Number of harmonics of the model error of a loop, and their sizes relative to that of the whole force, (25,): equal
+#: up to the last smooth one, then falling as 1/h. Their mean square is that of the whole.
 _ERROR_HARMONICS = 25
-#: Sizes of these over that of the whole force, (25,): their mean square is then that of the whole.
 _ERROR_SIZES = 1.0 / np.maximum(np.arange(1.0, _ERROR_HARMONICS + 1.0), SMOOTH_HARMONICS)
 _ERROR_SIZES /= np.linalg.norm(_ERROR_SIZES)
 
@@ -32,27 +33,23 @@ class MeasuredLoop(MeasuredBase):
 
     Args:
         prepared: loop prepared as an input of the model.
-        test_conditions: temperature of the rubber in the loop, and its strains before.
         fundamental_only: True to use only the first harmonic of the residuals, so that the loop is one operating point
             with two residuals: for an added stiffness that is known at the loop's frequency only.
         gain_error: standard deviation of the relative gain error of the whole record, by the accuracy class of its rig,
             and of the offset of its force, relative to half the force range.
         gain_weighs: True if the gain error is part of the noise that weights the residuals, as for a class stated in
             [rig]. An assumed gain error only widens the errors of fitted parameters.
-        model_error: standard deviation of the model's error of the force, relative to half the force range, added to
-            the noise; independent between harmonics h, and beyond the fifth proportional to 1/h. 0: noise alone.
-        first_error: number of the lowest harmonic that has the model error.
-        contradiction: sentence on a disagreement with an earlier test of the same points; None without one.
+        first_harmonic_errs: True if the model error includes the first harmonic of the force.
+
+    Notes:
+        The model error is independent between harmonics h, and beyond the fifth proportional to 1/h.
     """
 
     prepared: PreparedLoop
-    test_conditions: RubberConditions = UNKNOWN
     fundamental_only: bool = False
     gain_error: float = 0.0
     gain_weighs: bool = False
-    model_error: float = 0.0
-    first_error: int = 1
-    contradiction: str | None = None
+    first_harmonic_errs: bool = True
     kind = "loop"
     components = ("force",)
 
@@ -126,11 +123,9 @@ class MeasuredLoop(MeasuredBase):
         """Return the loop compared by the first harmonic of its force only."""
         return replace(self, fundamental_only=True)
 
-    def with_model_error(self, size: float) -> Self:
-        """Return the loop with this standard deviation of the model error, relative to half the force range."""
-        test = replace(self, model_error=size)
-        test.__dict__["_unit_error"] = self._unit_error
-        return test
+    def with_independent_noise(self) -> Self:
+        """Return the loop without model error and errors of the rig that all rows share."""
+        return replace(self, gain_error=0.0, model_error=0.0)
 
     def noise_free(self, model: Model) -> Self:
         """Return the test with the response of a model in place of the measured response."""
@@ -163,17 +158,7 @@ class MeasuredLoop(MeasuredBase):
     def jacobian(
         self, model: Model, names: Sequence[str], added: Array | None = None, *, as_share: bool = False
     ) -> Array:
-        """Derivatives of the whitened residuals by parameter value [SI]; the last are cached.
-
-        Args:
-            model: model at whose values the derivatives are taken.
-            names: names of the parameters.
-            added: stiffness added to the model's at each operating point (one in a loop), complex [N/m or N m/rad].
-            as_share: True if the added stiffness remains proportional to the model's; False if it is constant.
-
-        Returns:
-            Derivatives per SI unit of each parameter, (len(names), size).
-        """
+        """Derivatives of the whitened residuals by parameter value [SI], (len(names), size); see `MeasuredBase`."""
         if (rows := self._recall("jacobian", model, tuple(names))) is None:
             history = self.prepared.history(model.is_transient)
             if model.only_branches:  # whose derivatives do not need the force
@@ -244,16 +229,17 @@ class MeasuredLoop(MeasuredBase):
     def smooth_changes(self) -> Array:
         """Change of the whitened residuals by 11 smooth changes of the force, each of half the force range, (11, size).
 
-        These are a constant, and cosine and sine of five harmonics; with `fundamental_only` only the first is not 0.
+        These are a constant, and the columns of `basis` for five harmonics; with `fundamental_only` only the first
+        harmonic is not 0.
         """
-        rows = self.force_changes(self._waves)
+        rows = self.force_changes(basis(self.prepared.phase, SMOOTH_HARMONICS).T)
         if self.fundamental_only:
-            rows[[0, *range(3, len(rows))]] = 0.0
+            rows[np.delete(np.arange(len(rows)), [1, SMOOTH_HARMONICS + 1])] = 0.0
         return rows
 
     def gain_and_offset(self) -> Array:
         """Change of the whitened residuals by a gain error of 100 %, and by an offset of half the range, (2, size)."""
-        return self._whiten_shared(np.array([self._unit_gain, self._unit_offset]))
+        return self._shared.whiten(np.array([self._unit_gain, self._unit_offset]))
 
     def columns(self) -> dict[str, Any]:
         """Table columns by header that identify the point of each residual, such as time [s] and amplitude."""
@@ -274,11 +260,6 @@ class MeasuredLoop(MeasuredBase):
         """Reciprocal of the standard deviation of each row's force [1/N or 1/(N m)], (n,); 0 for unused rows."""
         return np.sqrt(self.prepared.weight) / (self.prepared.noise * self.prepared.row_noise.row_scale)
 
-    @cached_property
-    def _waves(self) -> Array:
-        """Constant, cosines and sines of five harmonics at the phases of the rows, (11, n)."""
-        return smooth_waves(self.prepared.phase)
-
     def _whiten_rows(self, rows: Array) -> Array:
         """Remove the autocorrelation of the noise from rows of force in units of noise, (..., n); unused rows become 0.
 
@@ -287,10 +268,6 @@ class MeasuredLoop(MeasuredBase):
         white = self.prepared.row_noise.whiten(rows)
         white *= self._usable_rows
         return white @ self._fundamental if self.fundamental_only else white
-
-    def _whiten_shared(self, white: Array) -> Array:
-        """Whiten rows of uncorrelated noise, (..., n), by the error that all rows share, `_shared`."""
-        return self._shared.whiten(white) if self._shared else white
 
     def force_changes(self, waves: Array) -> Array:
         """Changes of the whitened residuals, (c, size), by changes of the force relative to half its range, (c, n)."""
@@ -305,18 +282,18 @@ class MeasuredLoop(MeasuredBase):
         Returns:
             Whitened residuals, (..., size), whose noise is independent with unit variance.
         """
-        return self._whiten_shared(self._whiten_rows(difference))
+        return self._shared.whiten(self._whiten_rows(difference))
 
     @property
     def log_det_covariance(self) -> float:
         """ln det S of the residuals' covariance S = 1 + (error shared by all rows), in units of noise."""
-        return self._shared.log_det_covariance if self._shared else 0.0
+        return self._shared.log_det_covariance
 
     @cached_property
     def _fundamental(self) -> Array:
         """Orthonormal basis of the whitened rows of a first harmonic, (n, 2)."""
-        waves = self.prepared.row_noise.whiten(self._waves[1:3] * self._per_noise) * self._usable_rows
-        return np.linalg.qr(waves.T)[0]
+        waves = self.prepared.row_noise.whiten(basis(self.prepared.phase, 1).T[1:] * self._per_noise)
+        return np.linalg.qr((waves * self._usable_rows).T)[0]
 
     @cached_property
     def _unit_offset(self) -> Array:
@@ -331,51 +308,39 @@ class MeasuredLoop(MeasuredBase):
         the model towards small forces (Peelle's puzzle: R. Fruehwirth, D. Neudecker, H. Leeb, EPJ Web of Conferences
         27 (2012) 00008).
         """
-        waves, weighed = self._waves.T, self.weights > 0.0
+        waves, weighed = basis(self.prepared.phase, SMOOTH_HARMONICS), self.weights > 0.0
         smooth = waves @ np.linalg.lstsq(waves[weighed], self.prepared.force[weighed], rcond=None)[0]
         return self._whiten_rows(smooth * self._per_noise)
 
     @cached_property
-    def _shared(self) -> CommonError | None:
-        """Error that all rows of the loop share: the model error, or without one the errors of the rig; None without.
+    def _shared(self) -> SharedErrors:
+        """Errors that all rows of the loop share: the model error, or without one the errors of the rig.
 
         The zero of a load cell is uncertain by the class of its gain, relative to half the force range. A gain error
         that the weights of the residuals exclude is left out.
         """
         if self.model_error:
-            return self._unit_error.scaled(self.model_error)
+            return self.model_errors
         errors = [self._unit_offset, *([self._unit_gain] if self.gain_weighs else [])]
-        return CommonError(self.gain_error * np.array(errors)) if self.gain_error else None
+        return SharedErrors.from_columns(self.gain_error * np.array(errors))
 
     @cached_property
-    def _error_waves(self) -> Array:
-        """Change of the whitened rows by one standard deviation of each of c parts of a model error of 100 %, (c, n).
+    def unit_model_error(self) -> SharedErrors:
+        """Model error of 100 % of half the force range, as errors that the rows share.
 
-        The parts are cosine and sine of each harmonic and an offset, and for a loop from rest also a deviation of the
+        Its parts are cosine and sine of each harmonic and an offset, and for a loop from rest also a deviation of the
         first cycle and a drift.
         """
-        count = 1 if self.fundamental_only else _ERROR_HARMONICS
-        angle = 2.0 * np.pi * self.prepared.phase * np.arange(1, count + 1)[:, None]
-        waves = np.stack((np.cos(angle), np.sin(angle)), axis=1) * _ERROR_SIZES[:count, None, None]
-        waves = waves.reshape(-1, angle.shape[1])
+        count, phase = 1 if self.fundamental_only else _ERROR_HARMONICS, self.prepared.phase
+        waves = basis(phase, count).T[1:] * np.tile(_ERROR_SIZES[:count], 2)[:, None]
         if self.prepared.from_rest and not self.fundamental_only:  # the first cycle has its error and a drift
             order = np.arange(2.0 * np.ceil(self.prepared.cycles))[:, None]
-            drift = np.cos(np.pi * order * self.prepared.phase / self.prepared.cycles) / (1.0 + order)
-            waves = np.concatenate((waves, waves * (self.prepared.phase < 1.0), drift))
+            drift = np.cos(np.pi * order * phase / self.prepared.cycles) / (1.0 + order)
+            waves = np.concatenate((waves, waves * (phase < 1.0), drift))
         rows = self._whiten_rows(waves * (self._per_noise * self.prepared.half_range))
-        return np.concatenate((rows, _ERROR_SIZES[:1, None] * self._unit_offset))
-
-    @cached_property
-    def _unit_error(self) -> CommonError:
-        """Model error of 100 % of half the force range, as an error that the n rows share."""
-        return CommonError(self._error_waves[2 * (self.first_error - 1) :])
-
-    def error_products(self, model: Model, names: Sequence[str]) -> tuple[Array, Array, Array]:
-        """Inner products that determine the size of a model error; see `Whitening.error_products`."""
-        bare = replace(self, gain_error=0.0, model_error=0.0)
-        white = np.vstack((self._whiten_rows(self.misfit(model)), bare.jacobian(model, names)))
-        directions, size = self._unit_error.principal_errors
-        return white @ white.T, white @ directions * size, np.square(size)
+        if not self.first_harmonic_errs:
+            rows[[0, count]] = 0.0
+        return SharedErrors.from_columns(np.concatenate((rows, _ERROR_SIZES[:1, None] * self._unit_offset)))
 
     def noise_sensitivity(self, influence: Array) -> dict[Hashable, Array]:
         """Sensitivity of k parameter estimates to errors of each noise variance that was itself estimated.
@@ -387,7 +352,7 @@ class MeasuredLoop(MeasuredBase):
             By identifier of the variance, (k, size): the influence times the whitened derivative of the residuals'
             covariance by the variance, times the standard error of the variance.
         """
-        reaction = self._whiten_shared(influence)
+        reaction = self._shared.whiten(influence)
         whole = reaction @ self._fundamental.T if self.fundamental_only else reaction
         parts = self.prepared.row_noise.noise_sensitivity(whole)
         if self.fundamental_only:
@@ -395,7 +360,7 @@ class MeasuredLoop(MeasuredBase):
         if not parts and self.test.noise is None:
             rows = round(self.prepared.row_noise.observed_share * np.count_nonzero(self._usable_rows))
             parts = [np.sqrt(2.0 / rows) * reaction]
-        return {(self.name, index): self._whiten_shared(part) for index, part in enumerate(parts)}
+        return {(self.name, index): self._shared.whiten(part) for index, part in enumerate(parts)}
 
     def extra_covariance(self, influence: Array) -> Array:
         """Covariance, (k, k), of k parameter estimates by errors that the weights of the residuals do not include.
@@ -403,6 +368,6 @@ class MeasuredLoop(MeasuredBase):
         The gain error is added. The model error of the first harmonic, which a smooth error includes, is subtracted.
         `influence`: change of each estimate by a unit of each whitened residual, (k, size).
         """
-        first = influence @ self._whiten_shared(self.model_error * self._error_waves[:2]).T
-        gain = influence @ self._whiten_shared(self.gain_error * self._unit_gain)
-        return np.asarray(np.outer(gain, gain) - first @ first.T)
+        first = self.model_error * _ERROR_SIZES[0] * self.force_changes(basis(self.prepared.phase, 1).T[1:])
+        both = influence @ np.vstack((first, self.gain_error * self.gain_and_offset()[0])).T
+        return np.asarray(both * (-1.0, -1.0, 1.0) @ both.T)

@@ -13,6 +13,7 @@ from bushfit.fitting.measured_test import MeasuredBase
 from bushfit.fitting.noise import SweepNoise
 from bushfit.fitting.outliers import contradictions, outlying_points
 from bushfit.fitting.repeats import FLOOR
+from bushfit.fitting.shared_errors import SharedErrors
 from bushfit.fitting.whitening import Whitening
 from bushfit.model.model import Model
 from bushfit.model.result import Outlier
@@ -42,10 +43,6 @@ class MeasuredSweep(MeasuredBase):
         residuals: definition of the residuals: "complex", or magnitude and loss factor.
         weight: weight of each point, 0 to 1, (n,) in `order`; None for full weight.
         part: indices of the rows of the sweep that are used, (n,) in `order`; None for all rows.
-        test_conditions: temperature of the rubber at each row of the sweep, and its strains before, (rows,) each.
-        contradiction: sentence on a disagreement with an earlier test of the same points; None without one.
-        model_error: standard deviation of the relative error of the model at an operating point, added to the noise in
-            phase and in quadrature; repeats share the error.
         order: index of the row of each of the n used points in the sweep, (n,).
         frequency, amplitude, measured: frequency [Hz], zero-to-peak amplitude [m or rad] and complex stiffness [N/m or
             N m/rad] of each point, (n,) each.
@@ -60,9 +57,6 @@ class MeasuredSweep(MeasuredBase):
     residuals: Residuals = "complex"
     weight: Array | None = None
     part: Array | None = None
-    test_conditions: RubberConditions = UNKNOWN
-    contradiction: str | None = None
-    model_error: float = 0.0
     order: Array = field(init=False, repr=False)
     frequency: Array = field(init=False, repr=False)
     amplitude: Array = field(init=False, repr=False)
@@ -155,10 +149,6 @@ class MeasuredSweep(MeasuredBase):
         """Return the sweep with only those points that have weight."""
         weighed = self.weights > 0.0
         return self if weighed.all() else self.select(weighed)
-
-    def with_model_error(self, size: float) -> Self:
-        """Return the sweep with this standard deviation of the relative model error of an operating point."""
-        return replace(self, model_error=size)
 
     def noise_free(self, model: Model) -> Self:
         """Return the sweep with the stiffness of a model in place of the measured stiffness."""
@@ -306,16 +296,25 @@ class MeasuredSweep(MeasuredBase):
 
     @cached_property
     def covariance(self) -> Whitening:
-        """Covariance of the sweep's residuals in gain and phase, with which they are whitened."""
+        """Covariance of the sweep's residuals in gain and phase by the noise, with which they are whitened."""
         random = self.noise.scatter(self.name, self.held_value, self.step)
         if self.sweep.relative_error is not None and self.sweep.noise is None:
             random = np.maximum(np.tile(self.sweep.relative_error[self.order], (2, 1)), FLOOR)
-        line_starts = np.concatenate(([0], 1 + np.flatnonzero(np.diff(self.held_value))))
+        run = np.repeat(np.arange(self.block_starts.size), np.diff(self.block_starts, append=self.order.size))
+        line = np.unique(self.held_value, return_inverse=True)[1]
+        return Whitening(run, line, random, self.noise, self.weights)
+
+    @cached_property
+    def unit_model_error(self) -> SharedErrors:
+        """Relative model error of 100 %, in phase and in quadrature, which the repeats of an operating point share."""
         points = np.unique(self.frequency + 1j * self.amplitude, return_inverse=True)[1]
-        return Whitening(self.block_starts, line_starts, random, self.noise, self.weights, points, self.model_error)
+        return SharedErrors.of_groups(points, self.covariance.per_scatter, (1.0, 1.0))
 
     def whiten(self, difference: Array) -> Array:
         """Whiten deviations by the scatter and the errors that points share.
+
+        With a model error, the errors shared by runs and lines are no part of the weights: the model's error also
+        differs from level to level, and a level must not lose weight because of a smaller error of the rig.
 
         Args:
             difference: relative differences in magnitude + i differences in phase [rad], complex (..., n).
@@ -324,26 +323,27 @@ class MeasuredSweep(MeasuredBase):
             Whitened residuals in units of noise, (..., 2 n): n gains, then n phases.
         """
         with np.errstate(invalid="ignore"):
-            return self.covariance.whiten(difference)
+            rows = np.concatenate((difference.real, difference.imag), axis=-1) * self.covariance.per_scatter
+            return self.model_errors.whiten(rows) if self.model_error else self.covariance.whiten(rows)
 
     def noise_sensitivity(self, influence: Array) -> dict[Hashable, Array]:
         """Sensitivity of k parameter estimates to the error of each estimated noise variance; see `Whitening`."""
         return self.covariance.noise_sensitivity(influence)
 
     def extra_covariance(self, influence: Array) -> Array:
-        """Covariance, (k, k), of k estimates by errors that the weights do not include beside a model error."""
-        return self.covariance.extra_covariance(influence)
+        """Covariance, (k, k), of k estimates by errors that the weights do not include beside a model error.
 
-    @property
-    def log_det_covariance(self) -> float:
-        """Natural log of the determinant of the residuals' covariance with model error; 0 without one."""
-        return self.covariance.log_det_covariance if self.model_error else 0.0
+        The errors shared by runs and lines are added. The independent model error, which a smooth error includes, is
+        subtracted. `influence`: change of each estimate by a unit of each whitened residual, (k, 2 n).
+        """
+        noise, whitened = self.covariance, self.model_errors.whiten(influence)
+        lines = SharedErrors.of_groups(noise.line, noise.per_scatter, self.noise.level)
+        added = noise.runs.covariance(whitened) + lines.covariance(whitened)
+        return np.asarray(added - self.model_errors.covariance(whitened))
 
-    def error_products(self, model: Model, names: Sequence[str]) -> tuple[Array, Array, Array]:
-        """Inner products that determine the size of a model error; see `Whitening.error_products`."""
-        bare = replace(self, noise=replace(self.noise, shared=(0.0, 0.0), level=(0.0, 0.0)), model_error=0.0)
-        slopes = bare.jacobian(model, names)  # which keeps the response for the residuals
-        return self.covariance.error_products(np.vstack((bare.residual(model), slopes)))
+    def with_independent_noise(self) -> Self:
+        """Return the sweep without model error and errors that runs and lines share: with its scatter alone."""
+        return replace(self, noise=replace(self.noise, shared=(0.0, 0.0), level=(0.0, 0.0)), model_error=0.0)
 
     def relative_difference(self, model: Model) -> Array:
         """Model minus measured stiffness relative to the measured |K|: real and imaginary part, (2, n)."""

@@ -1,17 +1,21 @@
 """Base class of measured loops and sweeps: one test with its noise."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from bushfit.effects.contract import Array, Values
+from bushfit.effects.contract import UNKNOWN, Array, RubberConditions, Values
+from bushfit.fitting.shared_errors import SharedErrors
 from bushfit.geometry import Place
 from bushfit.model.model import Kind, Model
 from bushfit.reading.measurement import Loop, Source, Sweep
 
 
+@dataclass(frozen=True, eq=False, kw_only=True)
 class MeasuredBase(ABC):
     """One measured test with its noise: a loop from `prepare_loops` or a sweep from `prepare_sweeps`.
 
@@ -23,10 +27,18 @@ class MeasuredBase(ABC):
     Args:
         kind: "loop" or "sweep".
         components: names of the residuals of a point: "force", or "storage" and "loss".
+        test_conditions: temperature of the rubber, and its strains before: one number each for a loop, one for each row
+            of a sweep's file.
+        model_error: standard deviation of the model's error, added to the noise, relative to |K| in phase and in
+            quadrature, or relative to half the force range of a loop. 0: noise alone.
+        contradiction: sentence on a disagreement with an earlier test of the same points; None without one.
     """
 
     kind: ClassVar[Kind]
     components: ClassVar[tuple[str, ...]]
+    test_conditions: RubberConditions = UNKNOWN
+    model_error: float = 0.0
+    contradiction: str | None = None
 
     @property
     @abstractmethod
@@ -59,6 +71,59 @@ class MeasuredBase(ABC):
         Returns:
             Residuals in the force of each row, (..., size); of a sweep of n points, n gains, then n phases.
         """
+
+    @abstractmethod
+    def jacobian(
+        self, model: Model, names: Sequence[str], added: Array | None = None, *, as_share: bool = False
+    ) -> Array:
+        """Derivatives of the whitened residuals by parameter value [SI]; the last are cached.
+
+        Args:
+            model: model at whose values the derivatives are taken.
+            names: names of the k parameters.
+            added: stiffness added to the model's at each operating point (one in a loop), complex [N/m or N m/rad].
+            as_share: True if the added stiffness remains proportional to the model's; False if it is constant.
+
+        Returns:
+            Derivatives per SI unit of each parameter, (k, size).
+        """
+
+    @property
+    @abstractmethod
+    def unit_model_error(self) -> SharedErrors:
+        """Model error of 100 %, as errors that the residuals share."""
+
+    @abstractmethod
+    def with_independent_noise(self) -> Self:
+        """Return the test with independent noise alone, without errors that its residuals share."""
+
+    def with_model_error(self, size: float) -> Self:
+        """Return the test with a model error of this size, relative to |K| or half a loop's force range."""
+        test = replace(self, model_error=size)
+        test.__dict__["unit_model_error"] = self.unit_model_error
+        return test
+
+    @cached_property
+    def model_errors(self) -> SharedErrors:
+        """Model error of the test, as errors that the residuals share."""
+        return self.unit_model_error.scaled(self.model_error)
+
+    def error_products(self, model: Model, names: Sequence[str]) -> tuple[Array, Array, Array]:
+        """Compute what determines the size of a model error.
+
+        Args:
+            model: model near the minimum.
+            names: names of its k fitted parameters.
+
+        Returns:
+            Inner products of the m = k + 1 rows of residuals and derivatives in units of the independent noise, (m, m);
+            their components along the c independent directions of the model error, (m, c); and the variance along each
+            direction if the error has size 1, (c,).
+        """
+        test, error = self.with_independent_noise(), self.unit_model_error
+        slopes = test.jacobian(model, names)  # which keeps the response for the residuals
+        rows = np.vstack((test.residual(model), slopes))
+        return rows @ rows.T, rows @ error.directions * error.deviations, np.square(error.deviations)
 
     def misfit(self, model: Model) -> Array:
         """Model minus measured in units of noise, (size,), for tables: whitened for a sweep, row by row for a loop."""

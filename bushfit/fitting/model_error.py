@@ -29,7 +29,6 @@ from bushfit.effects.contract import Array
 from bushfit.effects.unnamed import Unnamed
 from bushfit.errors import FitError, ModelError
 from bushfit.fitting.assess import excess_chi_square
-from bushfit.fitting.common_error import CommonError
 from bushfit.fitting.coordinates import ROUNDING, Bounds, Coordinates, prior_covariance, prior_rows
 from bushfit.fitting.descent import TOLERANCE, Descent
 from bushfit.fitting.discrepancy import (
@@ -42,9 +41,10 @@ from bushfit.fitting.discrepancy import (
     discrepancies,
 )
 from bushfit.fitting.levels import level_error_columns
-from bushfit.fitting.preparation import MeasuredLoop, MeasuredTest, residual_slices
+from bushfit.fitting.preparation import MeasuredLoop, MeasuredTest, residual_slices, split_by_kind
 from bushfit.fitting.problem import FitProblem, FitResult, SmoothError
 from bushfit.fitting.rig_class import class_errors
+from bushfit.fitting.shared_errors import SharedErrors
 from bushfit.fitting.starts import start_values
 from bushfit.gaussian_process import MAXIMUM_NODES, RestrictedLikelihood
 from bushfit.model.model import Model
@@ -98,7 +98,8 @@ def with_model_error(
         return plain_fit, None
     weighed = [test.with_model_error(size) for test in plain_fit.covariance_tests or plain_fit.problem.tests]
     whole = Discrepancy.over_tests(_fitted_tests(closest, weighed), likeliest.groups, likeliest.lengths, MAXIMUM_NODES)
-    process = SmoothError(likeliest.best[1] * whole.complex_shapes, likeliest.likelihood.freedom(likeliest.best[1]))
+    columns = whole.tests.residual_changes(likeliest.best[1] * whole.complex_shapes)
+    process = SmoothError(columns, likeliest.likelihood.freedom(likeliest.best[1]))
     closest = replace(closest, noise_weighted=plain_fit.data_sets, outliers=plain_fit.outliers)
     return replace(closest, covariance_tests=weighed, smooth_error=process), error
 
@@ -215,7 +216,8 @@ def log_likelihood(solution: FitResult, prior_precision: Mapping[str, float]) ->
         across = shares @ tests.project(tests.free_jacobian).T
         information = information - across.T @ np.linalg.solve(shares @ shares.T + np.eye(len(shares)), across)
     information = information + np.diag([prior_precision.get(solution.names[i], 0.0) for i in solution.moving])
-    log_size = sum(test.log_det_covariance for test in tests.data_sets) + float(np.linalg.slogdet(information)[1])
+    log_size = sum(loop.log_det_covariance for loop in split_by_kind(tests.data_sets)[0])
+    log_size += float(np.linalg.slogdet(information)[1])
     for prior in solution.model.constraints.priors:
         names = [name for name in prior.names if name in solution.names]
         covariance = prior_covariance(prior, Coordinates.of_parameters(solution.model, names))
@@ -235,7 +237,7 @@ def _exceeds_noise(solution: FitResult, rig: RigSettings) -> bool:
     """True if chi-square of all tests, or of one, exceeds that of noise and errors of the rig's accuracy class."""
     squares, counts = [], [test.residual_count for test in solution.problem.tests]
     for test, rows in zip(solution.problem.tests, residual_slices(solution.problem.tests), strict=True):
-        whitened = CommonError(_errors_of_class(test, rig)).whiten(solution.residual[rows])
+        whitened = SharedErrors.from_columns(_errors_of_class(test, rig)).whiten(solution.residual[rows])
         squares.append(float(np.sum(np.square(whitened))))
     freedom = max(sum(counts) - len(solution.names), 1)
     pairs = [(sum(squares), freedom), *zip(squares, counts, strict=True)]
@@ -286,7 +288,7 @@ def _thinned(tests: Sequence[MeasuredTest], error: float = 0.0) -> list[Measured
     thinned = list[MeasuredTest]()
     for test in tests:
         if isinstance(test, MeasuredLoop):
-            thinned.append(replace(test, model_error=error, first_error=2) if error else test)
+            thinned.append(replace(test, model_error=error, first_harmonic_errs=False) if error else test)
         else:
             step = -(-test.order.size // _ENOUGH)
             thinned.append(test if step == 1 else test.select(np.arange(test.order.size) % step == 0))

@@ -10,9 +10,9 @@ import numpy as np
 
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError
-from bushfit.fitting.common_error import CommonError
 from bushfit.fitting.coordinates import ROUNDING, Bounds, Coordinates, coordinate_bounds, prior_rows
-from bushfit.fitting.preparation import MeasuredTest, residual_slices
+from bushfit.fitting.preparation import MeasuredTest
+from bushfit.fitting.shared_errors import SharedErrors
 from bushfit.model.covariance import Z95
 from bushfit.model.model import Model
 from bushfit.model.result import End, Outlier
@@ -40,7 +40,7 @@ class FitProblem:
     tests: Sequence[MeasuredTest]
     names: Sequence[str]
     bounds: Bounds = field(default_factory=dict)
-    shared_error: CommonError | None = None
+    shared_error: SharedErrors | None = None
 
     @classmethod
     def with_fixed(
@@ -131,28 +131,13 @@ class SmoothError:
     """Smooth error of a model over operating points (a Gaussian process), which widens the errors of its parameters.
 
     Args:
-        shapes: relative change of the stiffness by one standard deviation of each of q independent patterns, at the p
-            operating points of all tests, complex (q, p).
+        columns: change of the n whitened residuals of all tests by one standard deviation of each of q independent
+            patterns of the error, (q, n).
         freedom: degrees of freedom that determine the standard deviation of the error.
     """
 
-    shapes: Array
+    columns: Array
     freedom: float
-
-    def covariance(self, model: Model, tests: Sequence[MeasuredTest], influence: Array) -> Array:
-        """Covariance of k fitted parameters that the smooth error of the model causes, (k, k).
-
-        Args:
-            model: fitted model.
-            tests: fitted tests.
-            influence: change of each parameter, in any unit, by a unit of each of the n whitened residuals, (k, n).
-        """
-        changes = np.zeros((len(influence), len(self.shapes)))
-        by_test = np.split(self.shapes, np.cumsum([test.frequency.size for test in tests]), axis=1)
-        for test, rows, shapes in zip(tests, residual_slices(tests), by_test[:-1], strict=True):
-            change = shapes * test.noise_free(model).measured
-            changes += influence[:, rows] @ test.residual_change(change, model).T
-        return np.asarray(changes @ changes.T)
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,18 +1,14 @@
 """Covariance of a sweep's deviations: scatter from point to point, and errors shared by a block or a line.
 
 A block is a run: the points of one recording at one held amplitude or frequency. A line is the set of the runs with the
-same held value. A model error may be added to the noise: independent between operating points, shared by repeats.
+same held value.
 
 Notes:
     Within a block of points with scatter s_i and a shared error t the covariance is V = diag(s_i^2) + t^2 1 1^T. All
-    runs of a line may also share an error, u^2 1 1^T over the line. Let a_i = 1/s_i. A deviation is whitened by
-    dividing it by s_i and subtracting the share 1 - 1/sqrt(1 + t^2 sum a_i^2) of its component along a; then the error
-    shared by a line is removed in the same way. A point of weight w has s_i^2 = s^2/w; a point of weight 0 has no
-    effect, on shared errors either. Gains and phases are independent: deviations are real, (..., 2 n), gains first.
-
-    With a model error of standard deviation e the whitening covariance is diag(s_i^2) + e^2 R R^T, where R = 1 if a row
-    belongs to an operating point. Errors shared by runs and lines are not part of these weights: the model's error
-    also differs from level to level, and a level must not lose weight because of a smaller error of the rig.
+    runs of a line may also share an error, u^2 1 1^T over the line. A deviation is whitened by dividing it by s_i and
+    removing the error shared by its block; then the error shared by its line is removed in the same way. A point of
+    weight w has s_i^2 = s^2/w; a point of weight 0 has no effect, on shared errors either. Gains and phases are
+    independent: deviations are real, (..., 2 n), gains first.
 """
 
 from collections.abc import Hashable
@@ -23,119 +19,35 @@ import numpy as np
 
 from bushfit.effects.contract import Array
 from bushfit.fitting.noise import SweepNoise
-
-
-@dataclass(frozen=True, eq=False)
-class SharedError:
-    """Error shared by all deviations of a group (run, line or operating point), in addition to independent noise.
-
-    Args:
-        starts: index of the first deviation of each group, (g,).
-        unit: change of each deviation, in units of noise, by an error of 1, (m,).
-        variance: variance of the shared error of each group, (g,).
-    """
-
-    starts: Array
-    unit: Array
-    variance: Array
-
-    @cached_property
-    def group(self) -> Array:
-        """Index of the group (run, line or operating point) of each of the m gain or phase deviations, (m,)."""
-        return np.repeat(np.arange(self.starts.size), np.diff(self.starts, append=self.unit.size))
-
-    @cached_property
-    def weight(self) -> Array:
-        """Squared norm of the change of each group's deviations, in units of noise, by a shared error of 1, (g,)."""
-        return np.maximum(np.add.reduceat(self.unit**2, self.starts), np.finfo(float).tiny)
-
-    @cached_property
-    def share(self) -> Array:
-        """Fraction, 0 to 1, of each group's shared component that whitening subtracts, (g,)."""
-        return 1.0 - 1.0 / np.sqrt(1.0 + self.variance * self.weight)
-
-    def components(self, rows: Array) -> Array:
-        """Project deviations in units of noise, (..., m), on the shared error of each of g groups (such as runs).
-
-        Returns:
-            Inner products of the deviations with their change by a shared error of 1, (..., g).
-        """
-        return np.add.reduceat(rows * self.unit, self.starts, axis=-1)
-
-    def whiten(self, rows: Array) -> Array:
-        """Whiten deviations in units of noise, (..., m): subtract a share of the component that each group shares."""
-        if not self.variance.any():
-            return rows
-        return rows - (self.components(rows) / self.weight * self.share)[..., self.group] * self.unit
+from bushfit.fitting.shared_errors import SharedErrors
 
 
 @dataclass(frozen=True, eq=False)
 class Whitening:
-    """Covariance of the deviations (residuals in gain and phase) of a sweep, to whiten them.
+    """Covariance of the deviations (residuals in gain and phase) of a sweep by its noise, to whiten them.
 
     Args:
-        starts: index of the first point of each block (run), (blocks,).
-        lines: index of the first point of each line (adjacent blocks with one held value), (lines,).
+        run: index of the run (block) of each point, from 0, (n,).
+        line: index of the line (runs with one held value) of each point, from 0, (n,).
         random: standard deviation of the gain and phase of each point at full weight, (2, n).
         noise: noise of the campaign's sweeps: shared errors, and degrees of freedom of the estimates.
         weights: weight of each point, 0 to 1, (n,).
-        points: index of the operating point of each point, from 0, (n,).
-        model_error: standard deviation of the relative error of the model at each operating point, in phase and in
-            quadrature; 0 for noise alone.
     """
 
-    starts: Array
-    lines: Array
+    run: Array
+    line: Array
     random: Array
     noise: SweepNoise
     weights: Array
-    points: Array
-    model_error: float = 0.0
 
-    def whiten(self, deviation: Array) -> Array:
-        """Whiten deviations by scatter and shared errors, complex (..., n) -> (..., 2 n), gains, then phases."""
-        rows = np.concatenate((deviation.real, deviation.imag), axis=-1) * self._block.unit
-        return self._less_points(rows) if self.model_error else self._line.whiten(self._block.whiten(rows))
+    @cached_property
+    def per_scatter(self) -> Array:
+        """Reciprocal of the scatter of each deviation, (2 n,); 0 for points without weight."""
+        return (np.sqrt(self.weights) / self.random).ravel()
 
-    def extra_covariance(self, influence: Array) -> Array:
-        """Covariance of k parameter estimates that the weights of residuals do not include beside a model error.
-
-        Args:
-            influence: weight of each whitened residual in the k estimates, (k, 2 n).
-
-        Returns:
-            Covariance by the errors shared by runs and lines, minus that of the independent model error, which the
-            Gaussian process of the model error already includes, (k, k).
-        """
-        rows = self._less_points(influence) * self._block.unit
-        order, starts = self._by_point
-        added = np.zeros((len(rows), len(rows)))
-        for variance, sums in (
-            (np.full(starts.size, -(self.model_error**2)), np.add.reduceat(rows[:, order], starts, axis=-1)),
-            (self._block.variance, np.add.reduceat(rows, self._block.starts, axis=-1)),
-            (self._line.variance, np.add.reduceat(rows, self._line.starts, axis=-1)),
-        ):
-            added += (sums * variance) @ sums.T
-        return added
-
-    def error_products(self, rows: Array) -> tuple[Array, Array, Array]:
-        """Compute what determines the size of a model error.
-
-        Args:
-            rows: residuals of a model, and their derivatives by its k parameters, in units of the scatter, (m, 2 n).
-
-        Returns:
-            Inner products of these m = k + 1 rows, (m, m); their components along the c independent directions of the
-            model error, (m, c); and the variance along each direction if the error has size 1, (c,).
-        """
-        order, starts = self._by_point
-        components = np.add.reduceat((rows * self._block.unit)[:, order], starts, axis=-1)
-        return rows @ rows.T, components, self._point.weight
-
-    @property
-    def log_det_covariance(self) -> float:
-        """Natural log of the determinant of the covariance with model error, relative to that of the scatter alone."""
-        return float(np.sum(np.log1p(self._point.variance * self._point.weight)))
+    def whiten(self, rows: Array) -> Array:
+        """Whiten deviations in units of their scatter, (..., 2 n), by the errors that runs and lines share."""
+        return self._lines.whiten(self.runs.whiten(rows))
 
     def scaled(self, deviation: Array, *, shared: bool = True) -> Array:
         """Scale deviations by the scatter of each point, without whitening.
@@ -147,12 +59,12 @@ class Whitening:
         Returns:
             Gain and phase of each point in units of the scatter, (2, n).
         """
-        rows, block = np.concatenate((deviation.real, deviation.imag)), self._block
+        rows = np.concatenate((deviation.real, deviation.imag))
         if shared:
-            mean = block.components(rows * block.unit) / block.weight
-            level = np.repeat(np.square(self.noise.level), self.starts.size)
-            weight = (block.variance + level) * block.weight
-            rows = rows - (weight / (1.0 + weight) * mean)[block.group]
+            squares = np.square(self.per_scatter)
+            sums, weights = (np.bincount(self._run_of_residual, values) for values in (rows * squares, squares))
+            variance = np.repeat(np.square(self.noise.shared) + np.square(self.noise.level), weights.size // 2)
+            rows = rows - (sums * variance / (1.0 + variance * weights))[self._run_of_residual]
         return rows.reshape(2, -1) / self.random
 
     def noise_sensitivity(self, influence: Array) -> dict[Hashable, Array]:
@@ -169,18 +81,20 @@ class Whitening:
             of t^2 is a mean of `freedom` squares with expectation t^2 + s^2/n; its error is limited to t^2. The same
             applies to errors shared by lines.
         """
-        block, line, noise = self._block, self._line, self.noise
-        rows, reactions = line.whiten(influence), {}
+        runs, lines, noise = self.runs, self._lines, self.noise
+        rows, reactions = lines.whiten(influence), {}
         if noise.scatter_freedom:
-            reactions["scatter"] = line.whiten(block.whiten(block.whiten(rows))) * np.sqrt(2.0 / noise.scatter_freedom)
+            reactions["scatter"] = lines.whiten(runs.whiten(runs.whiten(rows))) * np.sqrt(2.0 / noise.scatter_freedom)
         if noise.freedom:
-            expected = block.variance + self.random.ravel()[block.starts] ** 2 / np.bincount(block.group)
-            error = np.minimum(expected * np.sqrt(2.0 / noise.freedom), block.variance) * (1.0 - block.share) ** 2
-            reactions["shared"] = line.whiten((block.components(rows) * error)[:, block.group] * block.unit)
+            group, variance = self._run_of_residual, np.square(runs.deviations)
+            _, first, counts = np.unique(group, return_index=True, return_counts=True)
+            scatter = np.bincount(group, np.square(self.per_scatter)) * np.square(self.random.ravel()[first]) / counts
+            error = np.minimum((variance + scatter) * np.sqrt(2.0 / noise.freedom), variance) / (1.0 + variance)
+            reactions["shared"] = lines.whiten(runs.multiply(rows, error))
         if noise.level_freedom:
-            expected = line.variance + 1.0 / line.weight
-            error = np.minimum(expected * np.sqrt(2.0 / noise.level_freedom), line.variance) * (1.0 - line.share)
-            reactions["level"] = (line.components(rows) * error)[:, line.group] * line.unit
+            variance = np.square(lines.deviations)
+            error = np.minimum((variance + 1.0) * np.sqrt(2.0 / noise.level_freedom), variance)
+            reactions["level"] = lines.multiply(rows, error / np.hypot(1.0, lines.deviations))
         is_gain = np.arange(rows.shape[-1]) < self.weights.size
         return {
             (id(noise), kind, part): reaction * only
@@ -189,33 +103,17 @@ class Whitening:
         }
 
     @cached_property
-    def _block(self) -> SharedError:
-        """Error shared by the points of a block (run), acting on deviations in units of their scatter."""
-        unit = (np.sqrt(self.weights) / self.random).ravel()
-        starts = np.concatenate((self.starts, self.starts + self.weights.size))
-        return SharedError(starts, unit, np.repeat(np.square(self.noise.shared), self.starts.size))
+    def runs(self) -> SharedErrors:
+        """Errors shared by the points of each run, acting on deviations in units of their scatter."""
+        return SharedErrors.of_groups(self.run, self.per_scatter, self.noise.shared)
 
     @cached_property
-    def _line(self) -> SharedError:
-        """Error shared by the blocks of a line (level), acting on deviations whose blocks are already whitened."""
-        starts = np.concatenate((self.lines, self.lines + self.weights.size))
-        unit = (1.0 - self._block.share)[self._block.group] * self._block.unit
-        return SharedError(starts, unit, np.repeat(np.square(self.noise.level), self.lines.size))
+    def _lines(self) -> SharedErrors:
+        """Errors shared by the runs of each line, acting on deviations already whitened by the errors of runs."""
+        shrunk = self.per_scatter / np.hypot(1.0, self.runs.deviations)[self._run_of_residual]
+        return SharedErrors.of_groups(self.line, shrunk, self.noise.level)
 
     @cached_property
-    def _by_point(self) -> tuple[Array, Array]:
-        """Indices that sort the 2 n deviations by operating point, gains first, and the first index of each group."""
-        labels = np.concatenate((self.points, self.points + self.points.max() + 1))
-        order = np.argsort(labels, kind="stable")
-        return order, np.concatenate(([0], 1 + np.flatnonzero(np.diff(labels[order]))))
-
-    @cached_property
-    def _point(self) -> SharedError:
-        """Model error shared by the repeats of an operating point, acting on deviations sorted by operating point."""
-        order, starts = self._by_point
-        return SharedError(starts, self._block.unit[order], np.full(starts.size, self.model_error**2))
-
-    def _less_points(self, rows: Array) -> Array:
-        remainder, order = np.empty_like(rows), self._by_point[0]
-        remainder[..., order] = self._point.whiten(rows[..., order])
-        return remainder
+    def _run_of_residual(self) -> Array:
+        """Index of the run of each gain and, after those of all gains, of each phase, (2 n,)."""
+        return np.concatenate((self.run, self.run + self.run.max() + 1))

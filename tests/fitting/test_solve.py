@@ -9,12 +9,12 @@ import pytest
 from bushfit.campaign.campaign import load_campaign
 from bushfit.effects import BASE, with_base
 from bushfit.errors import FitError
-from bushfit.fitting.common_error import CommonError
 from bushfit.fitting.coordinates import Coordinates
 from bushfit.fitting.descent import Descent
 from bushfit.fitting.preparation import MeasuredTest
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.problem import FitProblem
+from bushfit.fitting.shared_errors import SharedErrors
 from bushfit.fitting.starts import start_values
 from bushfit.model.model import FIVE, Model
 from tests.fits import residual, solve
@@ -61,7 +61,8 @@ def test_a_parameter_pushed_against_a_bound_rests_on_it_and_is_named(axial, pape
 
 def test_an_error_that_tests_share_whitens_residuals_and_derivatives_alike(axial, paper_model):
     columns = np.random.default_rng(0).normal(size=(2, sum(test.size for test in axial)))
-    problem, mu = FitProblem(paper_model, axial, FIVE, shared_error=CommonError(columns)), paper_model.values["mu"]
+    shared, mu = SharedErrors.from_columns(columns), paper_model.values["mu"]
+    problem = FitProblem(paper_model, axial, FIVE, shared_error=shared)
     above, below = (problem.residual(paper_model.with_values({"mu": mu * np.exp(s)})) for s in (1e-5, -1e-5))
     np.testing.assert_allclose(problem.jacobian(paper_model)[0], (above - below) / 2e-5, rtol=1e-3, atol=1e-2)
 

@@ -1,0 +1,97 @@
+"""Errors that several residuals share, which make them correlated: the residuals must be whitened together."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from bushfit.effects.contract import Array
+
+#: Variance along a direction, relative to the largest, below which it is rounding.
+_ROUNDING = 1e-14
+#: Number of entries of the directions of groups from which on they are a sparse array.
+_MANY_ENTRIES = 1_000_000
+
+
+@dataclass(frozen=True, eq=False)
+class SharedErrors:
+    """Independent errors that each change several residuals, such as the gain error of a run or of a loop.
+
+    Args:
+        directions: changes of the n residuals, in units of noise, by r independent errors, as orthonormal columns, (n,
+            r); a sparse array for very many groups.
+        deviations: standard deviation of the change along each direction, (r,).
+
+    Notes:
+        The covariance of the residuals is S = 1 + D diag(s^2) D^T with the directions D and the deviations s.
+        S^(-1/2) = 1 - D diag(1 - 1/sqrt(1 + s^2)) D^T whitens the residuals.
+    """
+
+    directions: Any
+    deviations: Array
+
+    @classmethod
+    def from_columns(cls, columns: Array) -> SharedErrors:
+        """Build errors from the changes of the n residuals by one standard deviation of each of q errors, (q, n)."""
+        variance, mixed = np.linalg.eigh(columns @ columns.T)
+        significant = variance > _ROUNDING * variance.max(initial=0.0)
+        deviations = np.sqrt(variance[significant])
+        return cls(columns.T @ (mixed[:, significant] / deviations), deviations)
+
+    @classmethod
+    def of_groups(cls, group: Array, change: Array, deviations: tuple[float, float]) -> SharedErrors:
+        """Build a gain and a phase error for each of g groups of a sweep's points; each point belongs to one group.
+
+        Args:
+            group: index of the group of each point, (n,).
+            change: change of the gain residuals, then of the phase residuals, by an error of 1, (2 n,).
+            deviations: standard deviations of the gain and the phase error of each group.
+
+        Returns:
+            Errors with one direction for the gain of each group, in order, then one for each phase.
+        """
+        of_residual = np.concatenate((group, group + group.max() + 1))
+        norm = np.sqrt(np.bincount(of_residual, np.square(change)))
+        entries = change / np.maximum(norm, np.finfo(float).tiny)[of_residual]
+        rows, deviation = np.arange(change.size), norm * np.repeat(deviations, norm.size // 2)
+        if change.size * norm.size > _MANY_ENTRIES:
+            from scipy.sparse import csr_array
+
+            return cls(csr_array((entries, (rows, of_residual))), deviation)
+        directions = np.zeros((change.size, norm.size))
+        directions[rows, of_residual] = entries
+        return cls(directions, deviation)
+
+    def scaled(self, size: float) -> SharedErrors:
+        """Multiply the errors by a positive factor `size`."""
+        return replace(self, deviations=size * self.deviations)
+
+    @property
+    def log_det_covariance(self) -> float:
+        """Natural log of the determinant of the residuals' covariance with the shared errors."""
+        return float(np.sum(np.log1p(np.square(self.deviations))))
+
+    def whiten(self, rows: Array) -> Array:
+        """Whiten residuals or derivatives in units of noise, (..., n), by the shared errors; same shape."""
+        if not self.deviations.any():
+            return rows
+        return rows - self.multiply(rows, 1.0 - 1.0 / np.hypot(1.0, self.deviations))
+
+    def multiply(self, rows: Array, factors: Array) -> Array:
+        """Project rows, (..., n), on the directions and multiply each of the r components by a factor, (r,).
+
+        Returns:
+            Sum of the multiplied components, (..., n).
+        """
+        return np.asarray((rows @ self.directions * factors) @ self.directions.T)
+
+    def covariance(self, influence: Array) -> Array:
+        """Covariance of k estimates by the shared errors, (k, k).
+
+        Args:
+            influence: change of each estimate by a unit of each residual, (k, n).
+        """
+        changes = influence @ self.directions * self.deviations
+        return np.asarray(changes @ changes.T)
