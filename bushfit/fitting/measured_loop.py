@@ -3,7 +3,7 @@
 from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 
@@ -240,15 +240,6 @@ class MeasuredLoop(MeasuredBase):
     def gain_and_offset(self) -> Array:
         """Change of the whitened residuals by a gain error of 100 %, and by an offset of half the range, (2, size)."""
         return self._shared.whiten(np.array([self._unit_gain, self._unit_offset]))
-
-    def columns(self) -> dict[str, Any]:
-        """Table columns by header that identify the point of each residual, such as time [s] and amplitude."""
-        unit, factor = self.direction.display.displacement
-        return {
-            "time [s]": self.prepared.phase / self.prepared.frequency,
-            "frequency [Hz]": self.prepared.frequency,
-            f"amplitude [{unit}]": self.prepared.amplitude * factor,
-        }
 
     @cached_property
     def _usable_rows(self) -> Array:

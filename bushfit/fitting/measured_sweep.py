@@ -3,7 +3,7 @@
 from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 
@@ -258,7 +258,13 @@ class MeasuredSweep(MeasuredBase):
             model: model whose stiffness changes.
             added: stiffness added to the model's at the points, complex (n,) [N/m or N m/rad].
         """
-        return self.whiten(self._deviation_change(change, self.stiffness(model) + added))
+        stiffness = self.stiffness(model) + added
+        relative = change / stiffness
+        if self.residuals == "complex":
+            return self.whiten(relative)
+        gain = np.abs(stiffness / self.measured) * relative.real
+        loss = relative.imag * (np.abs(stiffness) / stiffness.real) ** 2
+        return self.whiten(gain + 1j * loss * self._phase_per_loss)
 
     def deviation(self, stiffness: Array) -> Array:
         """Difference of a stiffness from the measured one, before whitening.
@@ -273,20 +279,6 @@ class MeasuredSweep(MeasuredBase):
             return np.log(stiffness / self.measured)
         gain = np.abs(stiffness / self.measured) - 1.0
         loss = stiffness.imag / stiffness.real - self.measured.imag / self.measured.real
-        return gain + 1j * loss * self._phase_per_loss
-
-    def _deviation_change(self, change: Array, stiffness: Array) -> Array:
-        """Change of `deviation` by a small change of the stiffness, gain + i phase [rad], complex (..., n).
-
-        Args:
-            change: change of the stiffness, complex (..., n) [N/m or N m/rad].
-            stiffness: stiffness that is changed, complex (..., n) [N/m or N m/rad].
-        """
-        relative = change / stiffness
-        if self.residuals == "complex":
-            return relative
-        gain = np.abs(stiffness / self.measured) * relative.real
-        loss = relative.imag * (np.abs(stiffness) / stiffness.real) ** 2
         return gain + 1j * loss * self._phase_per_loss
 
     @cached_property
@@ -392,8 +384,3 @@ class MeasuredSweep(MeasuredBase):
             chosen: mask of the points that have the error, (n,).
         """
         return [self.whiten(unit * chosen.astype(complex)) for unit in (1.0, 1.0j)]
-
-    def columns(self) -> dict[str, Any]:
-        """Table columns by header that identify each point: frequency [Hz], amplitude and repeat."""
-        unit, factor = self.direction.display.displacement
-        return {"frequency [Hz]": self.frequency, f"amplitude [{unit}]": self.amplitude * factor, "repeat": self.repeat}

@@ -83,9 +83,13 @@ def with_model_error(
         The fit, and the discrepancy as a correction of the stiffness; `plain_fit` and None if the model fits, or if the
         misfit is too large to be an error of this model.
     """
-    missed = certain or (not smooth and _exceeds_noise(plain_fit, rig)) or _is_smooth(plain_fit, rig)
-    if not (plain_fit.names and missed):
+    if not plain_fit.names:
         return plain_fit, None
+    if not certain and (smooth or not _exceeds_noise(plain_fit, rig)):
+        thinned = _thinned(plain_fit.problem.tests)
+        rig_errors = [_errors_of_class(test, rig) for test in thinned]
+        if not _is_smooth(FittedTests(plain_fit.reevaluate(plain_fit.model, thinned), rig_errors)):
+            return plain_fit, None
     closest, size = closest_fit(plain_fit, bounds)
     if size >= SIZES[-1]:  # that is no error of a model, but another thing than it
         return plain_fit, None
@@ -244,11 +248,8 @@ def _exceeds_noise(solution: FitResult, rig: RigSettings) -> bool:
     return any(excess_chi_square(square / count, count) is not None for square, count in pairs if count)
 
 
-def _is_smooth(solution: FitResult, rig: RigSettings) -> bool:
+def _is_smooth(tests: FittedTests) -> bool:
     """True if a smooth error of the model is more probable than noise and errors of the rig's class alone."""
-    thinned = _thinned(solution.problem.tests)
-    solution = solution.reevaluate(solution.model, thinned)
-    tests = FittedTests(solution, [_errors_of_class(test, rig) for test in thinned])
     names = tuple(dict.fromkeys(tests.directions.tolist()))
     quick = [Discrepancy.over_tests(tests, (names,), _MIDDLING, _FEW)]
     if tests.directions.size > _DENSE:

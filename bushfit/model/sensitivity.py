@@ -54,7 +54,7 @@ def stiffness_and_slopes(
     """
     if not model.only_branches:
         respond = partial(model.stiffness, direction, frequency, amplitude, kind=kind, conditions=conditions)
-        return _differences_at(direction, model, names, respond)
+        return differences(model, names, lambda values: respond(values=values), direction)
     test = 2.0 * np.pi * frequency, amplitude * model.unit_strain(direction)
     modulus, slopes = np.zeros(frequency.size), np.zeros((len(names), frequency.size), dtype=complex)
     for branch in model.structure.branches:
@@ -81,7 +81,7 @@ def force_and_slopes(
     """
     respond = partial(model.force, direction, displacement, kind="loop", conditions=conditions)
     if not model.only_branches:
-        return _differences_at(direction, model, names, respond)
+        return differences(model, names, lambda values: respond(values=values), direction)
     return respond(), force_slopes_of_branches(model, direction, displacement, names)
 
 
@@ -137,51 +137,34 @@ def _add_slopes(
         slopes[[row[name] for name in varied]] += by_value
 
 
-def _differences_at(
-    place: Place, model: Model, names: Sequence[str], respond: Callable[..., Array]
+def differences(
+    model: Model, names: Sequence[str], respond: Callable[[Values], Array], place: Place | None = None
 ) -> tuple[Array, Array]:
-    """Response of a model in one direction and its derivatives by one-sided differences.
-
-    Derivatives by parameters of other directions, such as `stiffness_factor.radial`, are 0 and are not computed.
-
-    Args:
-        place: direction or specimen of the response.
-        model: model; the derivatives are taken at its parameter values.
-        names: names of k parameters.
-        respond: function of the keyword argument `values`, parameter values, that gives the response.
-
-    Returns:
-        Response, (n,), and its derivatives per SI unit of each parameter, (k, n).
-    """
-    labels = place.labels if isinstance(place, Specimen) else (str(place),)
-    local = [i for i, name in enumerate(names) if place_suffix(name) in (None, *labels)]
-    response, local_slopes = differences(model, [names[i] for i in local], lambda values: respond(values=values))
-    slopes = np.zeros((len(names), response.size), dtype=response.dtype)
-    slopes[local] = local_slopes
-    return response, slopes
-
-
-def differences(model: Model, names: Sequence[str], respond: Callable[[Values], Array]) -> tuple[Array, Array]:
     """Response of a model and its derivatives by parameters, by one-sided differences that stay inside the bounds.
 
     Args:
         model: model; the derivatives are taken at its parameter values.
         names: names of k parameters.
-        respond: function from parameter values to the response, (..., n), called once; the values are arrays of shape
-            (k + 1, 1).
+        respond: function from parameter values to the response, (..., n), called once; the values are numbers, or
+            arrays with one more entry than there are derivatives to compute.
+        place: direction or specimen of the response; derivatives by parameters of other directions, such as
+            `stiffness_factor.radial`, are 0 and are not computed. None to compute all.
 
     Returns:
         Response, (n,), and its derivatives per SI unit of each parameter, (k, n).
     """
-    count = len(names)
-    stacked: dict[str, Value] = dict(model.values)
+    labels = place.labels if isinstance(place, Specimen) else (str(place),)
+    local = [i for i, name in enumerate(names) if place is None or place_suffix(name) in (None, *labels)]
+    count, stacked = len(local), dict[str, Value](model.values)
     steps = np.empty((count, 1))
-    for i, name in enumerate(names):
+    for row, name in enumerate(names[i] for i in local):
         parameter, value = model.parameters[name], model.values[name]
         step = _RELATIVE_STEP * (abs(value) if parameter.log and value else parameter.typical)
         column = np.full((count + 1, 1), value)
-        column[i] += step if value + step <= parameter.bounds[1] else -step
-        stacked[name], steps[i] = column, column[i] - value
+        column[row] += step if value + step <= parameter.bounds[1] else -step
+        stacked[name], steps[row] = column, column[row] - value
     responses = respond(cast(Values, stacked))
     responses = np.broadcast_to(responses, (count + 1, responses.shape[-1]))
-    return responses[count], (responses[:count] - responses[count]) / steps
+    slopes = np.zeros((len(names), responses.shape[-1]), dtype=responses.dtype)
+    slopes[local] = (responses[:count] - responses[count]) / steps
+    return responses[count], slopes

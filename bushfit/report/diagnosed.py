@@ -33,8 +33,16 @@ def gap_table(diagnosis: Diagnosis) -> pd.DataFrame:
     tables = []
     for data_set, corrected in zip(before.data_sets, after.data_sets, strict=True):
         columns: dict[str, Any] = {"test": data_set.name, "kind": data_set.kind, "direction": str(data_set.direction)}
-        columns |= condition_columns(data_set) if isinstance(data_set, MeasuredSweep) else {}
-        columns |= data_set.columns()
+        responses: Any  # a table, whose headers are texts
+        unit, factor = data_set.direction.display.displacement
+        if isinstance(data_set, MeasuredSweep):
+            responses = sweeps_table(diagnosis.result.model, [data_set])
+            columns |= {**condition_columns(data_set), "frequency [Hz]": data_set.frequency}
+            columns |= {f"amplitude [{unit}]": data_set.amplitude * factor, "repeat": data_set.repeat}
+        else:
+            responses = loops_table(diagnosis.result.model, [data_set])
+            columns |= {name: responses[name] for name in ("time [s]", "frequency [Hz]")}
+            columns[f"amplitude [{unit}]"] = data_set.prepared.amplitude * factor
         for name, model, test in (("before", before.model, data_set), ("after", after.model, corrected)):
             in_noise = np.split(-test.misfit(model), test.residuals_per_point)
             percent = -100.0 * test.relative_difference(model)
@@ -42,8 +50,6 @@ def gap_table(diagnosis: Diagnosis) -> pd.DataFrame:
                 f"{part} {name} [noise]": column for part, column in zip(test.components, in_noise, strict=True)
             }
             columns |= {f"{part} {name} [%]": column for part, column in zip(test.components, percent, strict=True)}
-        table: Any = loops_table if data_set.kind == "loop" else sweeps_table
-        responses = table(diagnosis.result.model, [data_set])
         tables.append(pd.DataFrame(columns | {name: responses[name] for name in responses if _MEASURED.match(name)}))
     return pd.concat(tables, ignore_index=True)
 
