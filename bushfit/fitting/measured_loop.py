@@ -239,7 +239,7 @@ class MeasuredLoop(MeasuredBase):
 
     def gain_and_offset(self) -> Array:
         """Change of the whitened residuals by a gain error of 100 %, and by an offset of half the range, (2, size)."""
-        return self._shared.whiten(np.array([self._unit_gain, self._unit_offset]))
+        return self.shared_errors.whiten(np.array([self._unit_gain, self._unit_offset]))
 
     @cached_property
     def _usable_rows(self) -> Array:
@@ -273,12 +273,7 @@ class MeasuredLoop(MeasuredBase):
         Returns:
             Whitened residuals, (..., size), whose noise is independent with unit variance.
         """
-        return self._shared.whiten(self._whiten_rows(difference))
-
-    @property
-    def log_det_covariance(self) -> float:
-        """ln det S of the residuals' covariance S = 1 + (error shared by all rows), in units of noise."""
-        return self._shared.log_det_covariance
+        return self.shared_errors.whiten(self._whiten_rows(difference))
 
     @cached_property
     def _fundamental(self) -> Array:
@@ -304,7 +299,7 @@ class MeasuredLoop(MeasuredBase):
         return self._whiten_rows(smooth * self._per_noise)
 
     @cached_property
-    def _shared(self) -> SharedErrors:
+    def shared_errors(self) -> SharedErrors:
         """Errors that all rows of the loop share: the model error, or without one the errors of the rig.
 
         The zero of a load cell is uncertain by the class of its gain, relative to half the force range. A gain error
@@ -343,7 +338,7 @@ class MeasuredLoop(MeasuredBase):
             By identifier of the variance, (k, size): the influence times the whitened derivative of the residuals'
             covariance by the variance, times the standard error of the variance.
         """
-        reaction = self._shared.whiten(influence)
+        reaction = self.shared_errors.whiten(influence)
         whole = reaction @ self._fundamental.T if self.fundamental_only else reaction
         parts = self.prepared.row_noise.noise_sensitivity(whole)
         if self.fundamental_only:
@@ -351,7 +346,7 @@ class MeasuredLoop(MeasuredBase):
         if not parts and self.test.noise is None:
             rows = round(self.prepared.row_noise.observed_share * np.count_nonzero(self._usable_rows))
             parts = [np.sqrt(2.0 / rows) * reaction]
-        return {(self.name, index): self._shared.whiten(part) for index, part in enumerate(parts)}
+        return {(self.name, index): self.shared_errors.whiten(part) for index, part in enumerate(parts)}
 
     def extra_covariance(self, influence: Array) -> Array:
         """Covariance, (k, k), of k parameter estimates by errors that the weights of the residuals do not include.

@@ -220,7 +220,7 @@ def log_likelihood(solution: FitResult, prior_precision: Mapping[str, float]) ->
         across = shares @ tests.project(tests.free_jacobian).T
         information = information - across.T @ np.linalg.solve(shares @ shares.T + np.eye(len(shares)), across)
     information = information + np.diag([prior_precision.get(solution.names[i], 0.0) for i in solution.moving])
-    log_size = sum(loop.log_det_covariance for loop in split_by_kind(tests.data_sets)[0])
+    log_size = sum(loop.shared_errors.log_det_covariance for loop in split_by_kind(tests.data_sets)[0])
     log_size += float(np.linalg.slogdet(information)[1])
     for prior in solution.model.constraints.priors:
         names = [name for name in prior.names if name in solution.names]

@@ -24,11 +24,11 @@ from bushfit.effects.contract import UNKNOWN, Array, RubberConditions
 from bushfit.effects.history import History
 from bushfit.errors import CampaignError
 from bushfit.geometry import Direction, Place
-from bushfit.model import rig
 from bushfit.model.model import Model
 from bushfit.progress import track
 from bushfit.reading.measurement import Loop
 from bushfit.reduction.resonance import shaken_response
+from bushfit.simulation import rig
 
 #: The paper's loop: 1 mm at 0.1 Hz.
 PAPER_LOOPS = (SimulatedLoop(Direction.AXIAL, 1e-3, 0.1, cycles=3),)

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from bushfit.geometry import Direction
-from bushfit.model import rig
+from bushfit.simulation import rig
 
 pytestmark = pytest.mark.slow
 

@@ -22,10 +22,10 @@ from bushfit.diagnosis.record import Diagnosis, DiagnosisSettings
 from bushfit.diagnosis.workflow import diagnose
 from bushfit.effects import twins_of
 from bushfit.fitting.prepared_campaign import PreparedCampaign
-from bushfit.model import rig
 from bushfit.model.model import Model
 from bushfit.report.page.record import read_results, report_record
 from bushfit.report.results import Formats, write_results
+from bushfit.simulation import rig
 from bushfit.simulation.measured import measure
 from bushfit.simulation.undisturbed import Undisturbed, undisturbed
 

@@ -23,9 +23,9 @@ from bushfit.effects import (
 from bushfit.errors import ModelError
 from bushfit.geometry import Direction
 from bushfit.model.model import Model
-from bushfit.model.rig import lock_in, simulate_cycles
 from bushfit.model.sensitivity import force_and_slopes, stiffness_and_slopes
 from bushfit.model.structure import structure_of
+from bushfit.simulation.rig import lock_in, simulate_cycles
 from bushfit.testing import CONDITIONS, check_effect, operating_point, random_model
 
 HARMONIC_ONLY = tuple(name for name in ADDED if LIBRARY[name].harmonic_only)

@@ -21,8 +21,8 @@ from bushfit.export.deck import DOFS, amplitude_levels
 from bushfit.geometry import Direction, Specimen
 from bushfit.model.model import Model
 from bushfit.model.result import Result
-from bushfit.model.rig import wave
 from bushfit.prediction.stiffness import predict
+from bushfit.simulation.rig import wave
 
 #: Agreement of the model itself with the kept computation, as tests/model/test_model.py holds it.
 MODEL = 2e-4

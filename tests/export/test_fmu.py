@@ -21,7 +21,7 @@ from bushfit.export.fmu import export
 from bushfit.export.in_time import FIELDS, time_model
 from bushfit.geometry import Bushing, Direction, Specimen
 from bushfit.model.model import Model
-from bushfit.model.rig import simulate_motion, wave
+from bushfit.simulation.rig import simulate_motion, wave
 from bushfit.units import CELSIUS
 
 #: Root mean square error that the force may have, relative: asked for.

@@ -16,9 +16,9 @@ from bushfit.fitting.preparation import MeasuredLoop, MeasuredSweep, MeasuredTes
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.prepared_loop import prepare_loop
 from bushfit.geometry import Direction
-from bushfit.model import rig
 from bushfit.model.model import FIVE, Model
 from bushfit.reading.measurement import Loop, Sweep
+from bushfit.simulation import rig
 
 RANDOM, SHARED = (5e-3, 7e-3), (4e-3, 3.5e-3)
 BLOCKS = {(1e-4, 1): 16, (1e-4, 2): 9, (5e-4, 1): 16}

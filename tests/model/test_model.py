@@ -16,11 +16,11 @@ from bushfit import effects, geometry, model, reduction
 from bushfit.effects import History
 from bushfit.effects.contract import Array, Setting, Values
 from bushfit.geometry import Direction
-from bushfit.model import rig
 from bushfit.model.covariance import Z95, Covariance
 from bushfit.model.file import from_document, to_document
 from bushfit.model.model import FIVE
 from bushfit.model.sensitivity import differences, force_and_slopes, stiffness_and_slopes
+from bushfit.simulation import rig
 
 PACKAGES = (effects, geometry, model, reduction)
 FREQUENCY = np.array([0.1, 5.0, 55.0, 155.0])

@@ -13,11 +13,11 @@ from bushfit.effects.rig_compliance import force as sleeve_force
 from bushfit.effects.unnamed import Patch, Unnamed
 from bushfit.errors import MeasurementError
 from bushfit.geometry import Direction
-from bushfit.model import rig
 from bushfit.model.covariance import Covariance
 from bushfit.model.result import Range, Result
 from bushfit.prediction.response import time_response
 from bushfit.reduction.displacement import noise_and_highest_frequency
+from bushfit.simulation import rig
 
 STEP, ROWS, FINER = 1e-3, 3000, 10
 TIME = np.arange(ROWS) * STEP

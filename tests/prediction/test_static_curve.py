@@ -7,7 +7,6 @@ import pytest
 
 from bushfit.errors import ModelError
 from bushfit.geometry import Direction
-from bushfit.model import rig
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
 from bushfit.model.result import Alternative, CampaignTable, Range, Result, TestTable
@@ -15,6 +14,7 @@ from bushfit.prediction.static_curve import static_curve, static_rate
 from bushfit.prediction.stiffness import predict
 from bushfit.prediction.superposed import LargeMotion
 from bushfit.reading.preload import Preload
+from bushfit.simulation import rig
 
 #: 10 mm/min.
 RATE = 10e-3 / 60.0

@@ -9,11 +9,11 @@ import pytest
 from bushfit.effects.contract import Array
 from bushfit.fitting.prepared_loop import prepare_loop
 from bushfit.geometry import Direction
-from bushfit.model import rig
 from bushfit.model.model import Model
 from bushfit.reading.measurement import Loop
 from bushfit.reading.stated import LoopFile
 from bushfit.reduction.programme import split_record
+from bushfit.simulation import rig
 
 STEP = 0.01
 

@@ -16,8 +16,8 @@ from bushfit.effects import History, friction
 from bushfit.effects.contract import Array
 from bushfit.effects.springpot import stress
 from bushfit.geometry import Bushing, Direction
-from bushfit.model import rig
 from bushfit.model.model import Model
+from bushfit.simulation import rig
 
 ALPHAS = (0.1, 0.24, 0.5, 0.9)
 STEPS = 2048

@@ -8,8 +8,8 @@ import pytest
 from bushfit.campaign.simulated import SimulatedLoop, SimulatedResonance, SimulatedSweep, SimulateSettings
 from bushfit.effects import BASE, LIBRARY, History, get_effect, qualified_name
 from bushfit.geometry import Direction, Specimen
-from bushfit.model import rig
 from bushfit.model.model import Model
+from bushfit.simulation import rig
 from bushfit.simulation.measured import measure, simulate
 from bushfit.simulation.undisturbed import Undisturbed, undisturbed
 

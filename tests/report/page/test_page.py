@@ -17,8 +17,8 @@ from bushfit.effects.history import History
 from bushfit.geometry import Direction
 from bushfit.model.file import from_document
 from bushfit.model.result import Result
-from bushfit.model.rig import wave
 from bushfit.report.page.report import comparable_sweeps
+from bushfit.simulation.rig import wave
 
 #: Keys of the documents whose texts come from a user's files.
 FOREIGN = {"name", "summary", "next_test", "command", "reading", "sentence", "evidence", "preload", "date", "warnings"}

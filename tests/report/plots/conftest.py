@@ -9,9 +9,9 @@ from figures import AMPLITUDES, FREQUENCIES
 from bushfit.effects.contract import Array
 from bushfit.fitting.preparation import MeasuredLoop, MeasuredSweep, prepare_loops, prepare_sweeps
 from bushfit.geometry import Direction
-from bushfit.model import rig
 from bushfit.model.model import Model
 from bushfit.reading.measurement import Loop, Sweep
+from bushfit.simulation import rig
 
 
 @pytest.fixture
