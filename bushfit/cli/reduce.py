@@ -101,6 +101,8 @@ def command(
         title = f"{records}: {len(reduction.steps)} points, {direction}"
         figure = partial(plots.inspection.reduction_figure, reduction, histories, title)
         _print_steps(output, reduction)
+    if body == "direction":
+        points = points.assign(direction=name)  # so that init knows it whatever the file is called
     file = output.formats.table("sweep")
     snippet = f'[[sweeps]]\nfile = "{file}"\n{body} = {json.dumps(name, ensure_ascii=False)}\n'
     document = {body: name, "points": points.to_dict(orient="list"), **document}

@@ -16,6 +16,7 @@ from bushfit.diagnosis.groups import Group
 from bushfit.effects.contract import Array
 from bushfit.fitting.measured_test import shown_amplitude
 from bushfit.fitting.preparation import MeasuredSweep, split_by_kind
+from bushfit.reading.preload import add_preload
 
 #: Maximum number of neighbouring frequencies that one disturbance covers: mains hum and its sidebands.
 _WIDEST = 3
@@ -76,7 +77,7 @@ def _levels(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> Iterator[Fau
         levels = np.concatenate(levels_of_direction)
         for level in np.unique(sweep.held_value):
             mask = sweep.held_value == level
-            label = _level_label(sweep, int(np.argmax(mask)))
+            label = add_preload(_level_label(sweep, int(np.argmax(mask))), sweep.sweep.preload, sweep.direction)
             if levels.size > 1:  # in this file or in others
                 part = _common_fault(evidence, "level", label, [sweep], [mask])
                 yield replace(part, may_be_physics=levels.size > 2 and level in (levels.min(), levels.max()))

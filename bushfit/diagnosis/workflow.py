@@ -18,6 +18,7 @@ from bushfit.diagnosis.search import Search
 from bushfit.diagnosis.verdict import decide_verdict
 from bushfit.effects import get_effect, place_suffix, qualified_name
 from bushfit.effects.mistakes import get_candidate, get_mistake
+from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.errors import FitError
 from bushfit.fitting.descent import Descent
 from bushfit.fitting.preparation import split_by_kind, with_gain_weighting
@@ -118,6 +119,8 @@ def _initial_fit(
     data_sets = data.require_tests(data.data_sets, "there is nothing to diagnose", hint)
     start = data.start_values(data_sets)
     model = replace(model or data.starting_model(data.effects, data_sets, {}), constraints=data.constraints)
+    if settings.adopt:
+        model = model.without(UNNAMED)  # a correction of an earlier diagnosis contains what is adopted now
     start = {name: value for name, value in start.items() if name in model.values and name not in fixed}
     for name in settings.adopt:
         if get_mistake(name) is None and name not in (model := model.with_twin(name)).effects:

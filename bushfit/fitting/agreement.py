@@ -30,6 +30,8 @@ _LONGEST_STEP = 0.3
 _SHARE = 0.95
 #: Smallest share of the points of a direction that must be predicted for the expected error to use these alone.
 _ENOUGH = 0.5
+#: Fewest points whose expected error is stated if all are fitted: the five parameters can pass through fewer points.
+_FEWEST_FITTED = 5
 #: Share of the information that comes from a prior, above which tests cannot contradict it.
 _ALL = 0.99
 
@@ -177,7 +179,8 @@ def expected_errors(
 
     Each run of a fitted test is held out, and predicted from the fit to the other runs, if these determine all
     parameters and change none by much; a test that was not fitted is always a prediction. If fewer than half the points
-    of a direction can be predicted, the errors of the fit itself at all its points are used.
+    of a direction can be predicted, the errors of the fit itself at all its points are used; a direction with very few
+    of them is left out.
 
     Args:
         model: fitted model.
@@ -277,6 +280,8 @@ def _errors_by_direction(parts: Sequence[tuple[str, Array, bool]]) -> tuple[Expe
         predicted = np.concatenate([np.empty((2, 0)), *held_out], axis=1)
         enough = predicted.shape[1] >= _ENOUGH * differences.shape[1]
         compared = predicted if enough else differences
+        if not enough and compared.shape[1] < _FEWEST_FITTED:
+            continue
         stiffness, loss = np.quantile(compared, _SHARE, axis=1, method="higher").tolist()
         found.append(ExpectedError(place, stiffness, loss, compared.shape[1], enough))
     return tuple(found)

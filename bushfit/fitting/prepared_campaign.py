@@ -107,8 +107,8 @@ class PreparedCampaign:
             return [*self.preload_notes]
         return [
             *self.preload_notes,
-            "no test was repeated at three points or more: the errors shared by a run are assumed from the class "
-            f"of the rig, {describe_class(self.campaign.rig)}",
+            "no test was repeated at three points or more: the errors shared by a run are those of the class of the "
+            f"rig, {describe_class(self.campaign.rig)}",
         ]
 
     @property

@@ -98,7 +98,7 @@ def sweep_groups(table: pd.DataFrame, result: Result) -> list[SweepGroup]:
                 levels, palette, units = [temperature.round(1), *levels], "temperature", ["°C", *units]
         for header in map(str, () if free else rows):
             if header.startswith("preload [") and rows[header].min() < rows[header].max():
-                levels, palette, units = [rows[header], *levels], "loop", [header[9:-1], *units]
+                levels, palette, units = [rows[header], *levels], "loop", [f"{header[9:-1]} preload", *units]
         curves = []
         by_level = rows.groupby([level.to_numpy() for level in levels], sort=not free, dropna=False)
         for values, of_level in by_level:
