@@ -14,7 +14,7 @@ from bushfit.diagnosis.propose import proposals
 from bushfit.diagnosis.record import Diagnosis
 from bushfit.diagnosis.refit import refitted
 from bushfit.diagnosis.workflow import diagnose
-from bushfit.effects import LIBRARY, twins_of
+from bushfit.effects import LIBRARY, get_effect, twins_of
 from bushfit.errors import ModelError, did_you_mean
 from bushfit.fitting.coordinates import Bounds, Coordinates, relative_sizes
 from bushfit.fitting.preparation import MeasuredTest, split_by_kind
@@ -175,10 +175,17 @@ def _add_effects(plain: Evidence, names: Sequence[str], fixed: Sequence[str], bo
         bounds: limits of parameters [SI], inside their default limits.
 
     Returns:
-        Fit with each effect by its name; effects without influence on these tests are omitted.
+        Fit with each effect by its name, and with the effect that it needs beside it (as second_maxwell needs maxwell);
+        effects without influence on these tests are omitted.
     """
     models = {proposal.name: proposal.model for proposal in proposals(plain, (), fixed) if proposal.name in names}
-    return refitted(plain, models, {}, fixed, bounds)
+    fits = refitted(plain, models, {}, fixed, bounds)
+    for name in names:
+        needed = get_effect(name).after
+        if name not in fits and needed and needed not in plain.model.effects:
+            for beside in _add_effects(plain, [needed], fixed, bounds).values():
+                fits |= _add_effects(beside, [name], fixed, bounds)
+    return fits
 
 
 def undecided_effects(diagnosis: Diagnosis) -> list[tuple[str, ...]]:

@@ -7,6 +7,7 @@ import numpy as np
 
 from bushfit.effects.contract import Array, RubberConditions
 from bushfit.effects.history import History
+from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.geometry import Place
 from bushfit.model.model import Model
 from bushfit.model.result import Result
@@ -14,7 +15,7 @@ from bushfit.model.sensitivity import force_and_slopes
 from bushfit.prediction.bands import Band, envelope, uncertainty
 from bushfit.prediction.caveats import extrapolations
 from bushfit.prediction.stiffness import tested_preload
-from bushfit.prediction.superposed import timed_candidates
+from bushfit.prediction.superposed import correction_factor, timed_candidates
 from bushfit.reading.preload import Preload, add_preload
 from bushfit.units import number
 
@@ -145,8 +146,10 @@ def _forces(
     frequency = rate / (4.0 * displacement[-1])
     cycle = History.steady(np.concatenate((strokes, strokes[-2:0:-1])), frequency)
     errors = uncertainty(result, model, place, np.array([frequency]), displacement[-1:], conditions)
-    force, slopes = force_and_slopes(model, place, cycle, errors.covariance.names, conditions)
+    force, slopes = force_and_slopes(model.without(UNNAMED), place, cycle, errors.covariance.names, conditions)
     changes = np.concatenate((force[None], slopes, errors.relative.real * force))
+    if model.unnamed:  # as in a sine of the same frequency and amplitude
+        changes *= np.abs(correction_factor(model, place, np.array([frequency]), displacement[-1:], conditions))
     loading = changes[:, : strokes.size : _SAMPLES]
     unloading = np.roll(changes, -1, axis=-1)[:, ::-1][:, : strokes.size : _SAMPLES]
     mean = 0.5 * (loading + unloading)

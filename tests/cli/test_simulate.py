@@ -6,7 +6,7 @@ import shutil
 import numpy as np
 import pandas as pd
 import pytest
-from shell import BUSHING, document, names, refused, values
+from shell import BUSHING, GEOMETRY, document, names, refused, values
 
 from bushfit.geometry import Direction
 from bushfit.reading.stated import SweepFile
@@ -48,6 +48,9 @@ def test_a_raw_record_becomes_a_sweep_that_fits(typed, root, tmp_path, paper_mod
     assert len(set(sweep.amplitude)) == 3
 
     shutil.copy(root / "data/cmp_15961/loop_axial_1.csv", tmp_path / "x")
+    shutil.copy(tmp_path / "x/sweep.csv", tmp_path / "unnamed.csv")  # the table states the direction, not the name
+    typed("init", "unnamed.csv", "-o", "unnamed.toml", *GEOMETRY)
+    assert 'direction = "axial"' in (tmp_path / "unnamed.toml").read_text(encoding="utf-8")
     snippet = done.stderr.partition("add the path):")[2]
     loop = '[[loops]]\nfile = "loop_axial_1.csv"\ndirection = "axial"\n'
     (tmp_path / "x/campaign.toml").write_text(BUSHING + loop + snippet, encoding="utf-8")

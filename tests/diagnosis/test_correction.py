@@ -76,7 +76,8 @@ def result(described) -> Result:
 def test_what_the_diagnosis_says(measured):
     """On a rig of which it is known that no error of a level makes it up."""
     rig = RigSettings(gain_error=5e-4, phase_error=5e-4)
-    found = asked(replace(with_relaxation(measured()), rig=rig), max_effects=1)
+    campaign = replace(with_relaxation(measured()), rig=rig)
+    found = asked(campaign, max_effects=1)
     assert found.verdict == "described"
     assert [effect.name for effect in found.effects] == ["unnamed"]
     assert "unnamed" in found.result.model.effects
@@ -89,6 +90,8 @@ def test_what_the_diagnosis_says(measured):
     assert complaints("diagnosis", json.loads(to_json(document)), whole=True) == []
     inside = predict(found.result, Direction.AXIAL, [45.0, 95.0], [LEVELS[1]]).stiffness
     assert np.all(inside.high - inside.value < 0.01 * inside.value)
+    adopted = asked(campaign, found.result.model, max_effects=0, adopt=("rig_compliance",)).result.model
+    assert adopted.effects[-1] == "rig_compliance", "the correction is left out, because it would hide what is adopted"
 
 
 def test_predictions_use_it_inside_the_range_and_open_outside(result):

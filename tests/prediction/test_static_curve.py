@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from bushfit.effects.unnamed import Patch, Unnamed
 from bushfit.errors import ModelError
 from bushfit.geometry import Direction
 from bushfit.model.covariance import Covariance
@@ -117,6 +118,16 @@ def test_a_law_of_the_harmonic_alone_has_no_curve_unless_it_is_the_rigs(paper_mo
     rigged = paper_model.with_effect("rig_compliance", {"rig_compliance.compliance": 1e-7})
     kept, plain = (static_curve(Result(model), Direction.AXIAL, 1e-3, RATE) for model in (rigged, paper_model))
     np.testing.assert_array_equal(kept.mean.value, plain.mean.value)
+
+
+def test_a_smooth_correction_changes_the_curve_as_in_a_sine(paper_model):
+    node = (RATE / 4e-3,), (1e-3 * paper_model.unit_strain(Direction.AXIAL),)
+    data = Unnamed(0.1, (1.0, 1.0), (Patch(("axial",), *node, (0.1,), (0.0,), (0.01,), (0.01,)),))
+    effects = (*paper_model.effects, "unnamed")
+    corrected = Model.with_defaults(paper_model.bushing, effects, paper_model.values, data)
+    curve, plain = (static_curve(Result(model), Direction.AXIAL, 1e-3, RATE) for model in (corrected, paper_model))
+    assert curve.secant.value == pytest.approx(1.1 * plain.secant.value, rel=1e-3)
+    assert curve.secant.high - curve.secant.value == pytest.approx(1.96 * 0.01 * plain.secant.value, rel=0.05)
 
 
 def test_an_alternative_without_a_law_in_time_is_left_out_with_a_sentence(paper_model):

@@ -67,8 +67,9 @@ def headline_texts(record: ReportRecord, prediction: Prediction) -> dict[str, st
         curve = static_curve(result, place, amplitude, static_rate(result, place))
         static, ratio = to_unit * float(curve.secant.value[0]), float(point.stiffness.value[0] / curve.secant.value[0])
         relative = [band.root[:, 0] / band.value[0] for band in (point.stiffness, curve.secant)]
-        corrected = result.model.unnamed is not None  # a static curve excludes the error of a smooth correction
-        half = 0.0 if corrected else Z95 * ratio * float(np.linalg.norm(relative[0] - relative[1]))
+        # the errors of a smooth correction differ between the two frequencies
+        spread = np.concatenate(relative) if result.model.unnamed else relative[0] - relative[1]
+        half = Z95 * ratio * float(np.linalg.norm(spread))
         row["static"], row["static_point"] = f"{format_aligned([static], 4)[0]} {unit}", f"at {curve.rate_text}"
         decimals = max(2, math.ceil(-math.log10(2.0 * half))) if half else 2  # the interval is not rounded to 0
         row["stiffening"] = f"{ratio:.{decimals}f}" + (f" ± {half:.{decimals}f}" if half else "")
