@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from bushfit.errors import ModelError, printable
 from bushfit.model.file import read_document, require_schema
 from bushfit.report.results import ResultFile
-from bushfit.units import number
+from bushfit.units import format_range, number
 from bushfit.validation import validate_tables
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ def templates() -> jinja2.Environment:
     """Make the environment of the templates, which escapes texts.
 
     Returns:
-        Environment with the filters `number` (significant digits) and `formula`.
+        Environment with the filters `number` (significant digits) and `formula`, and the function `format_range`.
     """
     import jinja2
 
@@ -60,6 +60,7 @@ def templates() -> jinja2.Environment:
         lstrip_blocks=True,
     )
     environment.filters |= {"number": number, "formula": formula}
+    environment.globals["format_range"] = format_range
     return environment
 
 

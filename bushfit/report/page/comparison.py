@@ -1,12 +1,10 @@
 """Content of the page of a comparison: parameters, stiffness and loss factor side by side, and their differences."""
 
 from collections.abc import Iterator
-from dataclasses import astuple
 from typing import Any
 
 import numpy as np
 
-from bushfit.geometry import Bushing
 from bushfit.report import plots
 from bushfit.report.compared import (
     FAMILY_HEADS,
@@ -17,7 +15,7 @@ from bushfit.report.compared import (
     parameter_cells,
 )
 from bushfit.report.page import render_page
-from bushfit.report.page.report import MOST, group_warnings, summarize_conditions, tube_description
+from bushfit.report.page.report import MOST, group_warnings, summarize_conditions
 from bushfit.report.page.svg import picture
 from bushfit.report.page.values import spread_points
 from bushfit.report.results import ResultFile
@@ -48,15 +46,7 @@ def comparison_page(comparison: ComparisonDocument, chart: ResultFile | None = N
         title = f"Model families of {bushing.name if bushing else compared[0]['source']}"
     elif len(other_names) == 1:
         title = f"{other_names[0]} compared with {reference}"
-    entries = list[dict[str, Any]]()
-    for entry in compared:
-        measured, tests = entry["measured"], "parameters given, not fitted"
-        if measured:
-            strain = format_range("%", *(100.0 * end for end in measured.strain))
-            tests = f"{format_range('Hz', *measured.frequency)}, strain {strain}, {', '.join(measured.directions)}"
-        body = tube_description(Bushing(*astuple(entry["bushing"]))) if entry["bushing"] else "rubber compound"
-        test_conditions = dict(summarize_conditions(source.conditions for source in entry["inputs"]))
-        entries.append({"of": entry, "body": body, "tests": tests, "conditions": test_conditions})
+    conditions = [summarize_conditions(source.conditions for source in entry["inputs"]) for entry in compared]
     labels: dict[tuple[str, str], list[str]] = {}
     for entry in compared:
         inputs = [(str(source.file), source.sha256) for source in entry["inputs"]]
@@ -74,8 +64,8 @@ def comparison_page(comparison: ComparisonDocument, chart: ResultFile | None = N
         if all(results[0].stiffness.startswith("modulus") for results in differences.values())
         else "stiffness",
         "title": title,
-        "entries": entries,
-        "differ": [name for name in _CONDITIONS if len({row["conditions"].get(name) for row in entries}) > 1],
+        "entries": [{"of": entry, "conditions": stated} for entry, stated in zip(compared, conditions, strict=True)],
+        "differ": [name for name in _CONDITIONS if len({stated[name] for stated in conditions}) > 1],
         "sizes": [difference_sizes(one) for of_place in differences.values() for one in of_place],
         "family_heads": FAMILY_HEADS,
         "family_rows": [*comparison.family_cells()],

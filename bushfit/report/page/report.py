@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,8 +12,7 @@ import pandas as pd
 
 from bushfit.diagnosis.record import format_odds
 from bushfit.effects.temperature import REFERENCE
-from bushfit.geometry import STRAINING, TRANSLATION, Bushing, Specimen
-from bushfit.model.document import TestTable
+from bushfit.geometry import STRAINING, TRANSLATION
 from bushfit.model.result import Result
 from bushfit.prediction.caveats import by_importance, consequence_of, warnings_of
 from bushfit.reading.measurement import SAME_TEMPERATURE
@@ -25,31 +24,18 @@ from bushfit.report.page.values import headline_texts, value_rows
 from bushfit.report.parameters import correlation_texts, effect_sizes, parameter_rows
 from bushfit.report.results import ResultFile
 from bushfit.report.tables import DISPLAYS, missing_column
-from bushfit.units import CELSIUS, format_range, number
+from bushfit.units import CELSIUS, number
 
 if TYPE_CHECKING:
     from bushfit.report.plots.style import Chart
 
-#: CSS class that colours each verdict; all others are "fair".
-_TONES = {"consistent": "good", "named": "good", "unexplained": "bad"}
-#: Consequence of each verdict for the use of the numbers.
-_CONSEQUENCES = {
-    "consistent": "The model agrees with the tests within their noise. Use the model within the tested range.",
-    "named": "Use the model, which includes the named effect, within the tested range.",
-    "ambiguous": "Use stiffness and loss within the tested range. Do not attribute the difference to one cause yet.",
-    "described": "Use the whole band, from low to high, within the tested range. The cause is not known.",
-    "partly": "Part of the difference is not explained. Use the numbers with their bands, within the tested range.",
-    "unexplained": "Do not release these numbers: the model misses the tests, and the cause is not known.",
-}
-#: Label of each test condition, and its text in the table of tests, by campaign key; empty where it is not shown.
-#: Temperature, preload and date are listed even if they are not stated.
+#: Label of each test condition by campaign key; temperature, preload and date are listed even if they are not stated.
 _CONDITIONS = {
-    "temperature_degC": ("Temperature", "{} °C"),
-    "preload": ("Preload", "{} preload"),
-    "date": ("Date of tests", ""),
-    "operator": ("Operator", ""),
-    "specimen_number": ("Specimen no.", "part {}"),
-    "order": ("", "no. {} of the session"),
+    "temperature_degC": "Temperature",
+    "preload": "Preload",
+    "date": "Date of tests",
+    "operator": "Operator",
+    "specimen_number": "Specimen no.",
 }
 #: Largest numbers of tests and regions, and of directions and specimens, in a page; the result files contain all.
 MOST, _MOST_PLACES = 12, 6
@@ -76,11 +62,6 @@ def report_page(files: Sequence[ResultFile], date: str | None = None, folder: Pa
     result, diagnosis, campaign = record.result, record.diagnosis, record.campaign
     head = {**(campaign.report if campaign else {}), **({"date": date} if date else {})}
     tests = campaign.tests if campaign else ()
-    bodies = [("Bushing", tube_description(result.model.bushing))] if result.model.bushing else []
-    tubes = len(result.bushings) + (result.model.bushing is not None)
-    bodies += [(f"Bushing {bushing.name}", tube_description(bushing)) for bushing in result.bushings]
-    coupons = [specimen for specimen in result.specimens if not specimen.bushing]
-    bodies += [(f"Specimen {specimen}", specimen_description(specimen)) for specimen in coupons]
     predictions = [*record.predictions.values()][:_MOST_PLACES]
     place_warnings = [prediction.warnings for prediction in record.predictions.values()]
     warnings = warnings_of(result, place_warnings, diagnosis["warnings"] if diagnosis else ())
@@ -91,37 +72,27 @@ def report_page(files: Sequence[ResultFile], date: str | None = None, folder: Pa
     ends = [20.0 * math.log10(end) for end in (min(map(np.min, sizes)), max(map(np.max, sizes)))] if sizes else []
     sources: list[Any] = [*([campaign] if campaign else []), *tests, *result.inputs]
     context = {
-        "name": campaign.name if campaign else result.name,
-        "subject": "rubber compound" if not tubes else "rubber bushing" if tubes == 1 else "rubber bushings",
-        "head": {key.replace("_", " ").capitalize(): text for key, text in head.items()},
-        "logo": campaign.logo if campaign else None,
-        "facts": [*bodies, *summarize_conditions(test.conditions for test in tests)],
-        "headlines": [headline_texts(record, prediction) for prediction in predictions],
+        "result": result,
+        "campaign": campaign,
         "diagnosis": diagnosis,
-        "tone": _TONES.get(diagnosis["verdict"], "fair") if diagnosis else "fair",
-        "consequence": _CONSEQUENCES[diagnosis["verdict"]] if diagnosis else "",
-        "effects": [
-            (effect, [size for size in effect_sizes(effect) if size[0] not in result.model.parameters])
-            for effect in (diagnosis["effects"] if diagnosis else ())
-        ],
+        "versions": record.versions,
+        "head": {key.replace("_", " ").capitalize(): text for key, text in head.items()},
+        "conditions": summarize_conditions(test.conditions for test in tests),
+        "headlines": [headline_texts(record, prediction) for prediction in predictions],
+        "sizes": effect_sizes,
         "odds": format_odds(diagnosis) if diagnosis else [],
         "pictures": pictures,
         "left_out": left_out,
         "rows": list(parameter_rows(result)),
-        "interval": "95 % by profile" if result.profile else "95 % interval",
         "plain": {row.name: row.value for row in parameter_rows(plain)} if plain else {},
-        "quality": result.quality,
         "correlations": correlation_texts(result),
-        "model_error": result.model_error is not None,
-        "equation": result.model.equation().splitlines()[0],
-        "tests": test_rows(result, tests[:MOST]),
-        "conditioned": any(test.conditions for test in tests),
+        "tests": tests[:MOST],
+        "agreement": {misfit.test: misfit for misfit in result.tests if misfit.held is None},
+        "displays": DISPLAYS,
         "more_tests": max(0, len(tests) - MOST),
         "tabled": [*value_rows(predictions)],
         "warnings": group_warnings(warnings),
-        "campaign": campaign,
         "files": list(dict.fromkeys((str(one.file), one.sha256) for one in sources if one.file and one.sha256)),
-        "versions": record.versions,
         "levels": " to ".join(dict.fromkeys(f"{end:.1f}" for end in ends)),
         "moduli": any(prediction.direction.motion is STRAINING for prediction in predictions),
     }
@@ -202,72 +173,22 @@ def group_warnings(warnings: Iterable[str]) -> dict[str, list[str]]:
     return groups
 
 
-def tube_description(bushing: Bushing) -> str:
-    """Describe the dimensions [mm] of a bushing in words."""
-    sizes = 2 * bushing.inner_radius, 2 * bushing.outer_radius, bushing.length
-    inner, outer, length = (number(1e3 * size, 4) for size in sizes)
-    formulas = "; radial formulas corrected by finite elements" if bushing.shape == "calibrated" else ""
-    return f"rubber tube, inner diameter {inner} mm, outer diameter {outer} mm, length {length} mm{formulas}"
-
-
-def specimen_description(specimen: Specimen) -> str:
-    """Describe the dimensions of a specimen in words."""
-    if specimen.area is None or specimen.thickness is None:
-        return f"modulus of the compound, {specimen.strain} strain"
-    blocks = "one block" if specimen.elements == 1 else f"{specimen.elements} blocks in parallel"
-    return (
-        f"{blocks} in shear, {number(1e6 * specimen.area, 4)} mm² each, {number(1e3 * specimen.thickness, 4)} mm thick"
-    )
-
-
-def summarize_conditions(test_conditions: Iterable[Mapping[str, str | float]]) -> Iterator[tuple[str, str]]:
+def summarize_conditions(test_conditions: Iterable[Mapping[str, str | float]]) -> dict[str, str]:
     """Summarise the conditions of all tests: temperature, preload, date, operator and specimen number.
 
     Args:
         test_conditions: conditions of each test by campaign key.
 
     Returns:
-        An iterator over pairs of name and text: a range of numbers, or the distinct values.
+        Text by name of the condition: a range of numbers, or the distinct values.
     """
-    tests = list(test_conditions)
-    for key, (name, _) in _CONDITIONS.items():
+    tests, texts = list(test_conditions), dict[str, str]()
+    for key, name in _CONDITIONS.items():
         values = list(dict.fromkeys(test[key] for test in tests if key in test))
-        if not name:
-            continue
         if numbers := sorted(value for value in values if not isinstance(value, str)):
             unit = " °C" if key == "temperature_degC" else ""
-            yield name, " to ".join(dict.fromkeys(f"{number(end, 3)}{unit}" for end in (numbers[0], numbers[-1])))
-        elif values:
-            yield name, ", ".join(map(str, values))
-        elif key in ("temperature_degC", "preload", "date"):
-            yield name, "not stated"
-
-
-def test_rows(result: Result, tests: Iterable[TestTable]) -> list[dict[str, str | int]]:
-    """Rows of the table of tests in a report: range, conditions and NRMSE of the model for each test.
-
-    Returns:
-        Texts of each row, and its number of recorded rows, by the names that the template uses.
-    """
-    misfits = {misfit.test: misfit for misfit in result.tests if misfit.held is None}
-    rows = list[dict[str, str | int]]()
-    for test in tests:
-        unit, factor = DISPLAYS[test.unit]
-        texts = {key: text if isinstance(text, str) else number(text, 3) for key, text in test.conditions.items()}
-        row: dict[str, str | int] = {
-            "test": test.test,
-            "kind": "hysteresis loop" if test.kind == "loop" else test.kind,
-            "place": test.place,
-            "frequency": format_range("Hz", *test.frequency_Hz),
-            "amplitude": format_range(unit, *(factor * end for end in test.amplitude)),
-            "rows": test.rows,
-            "conditions": ", ".join(
-                form.format(texts[key]) for key, (_, form) in _CONDITIONS.items() if form and key in texts
-            ),
-            **dict.fromkeys(("use", "nrmse", "chi"), ""),
-        }
-        if misfit := misfits.get(test.test):
-            row["use"] = "fitted" if misfit.fitted else "not fitted"
-            row["nrmse"], row["chi"] = f"{number(100 * misfit.nrmse, 2)} %", number(misfit.reduced_chi_square, 2)
-        rows.append(row)
-    return rows
+            ends = dict.fromkeys(f"{number(end, 3)}{unit}" for end in (numbers[0], numbers[-1]))
+            texts[name] = " to ".join(ends)
+        elif values or key in ("temperature_degC", "preload", "date"):
+            texts[name] = ", ".join(map(str, values)) or "not stated"
+    return texts
