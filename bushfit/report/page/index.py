@@ -56,8 +56,8 @@ def index_page(batch: BatchFile, folder: Path, base: str = "") -> str:
         listed[status[-1]].append((part, links[-1]))
     named_twice = all(part.labels.get("campaign name") in ("", part.name) for part in parts)
     labels = [name for name in _LABELS[named_twice:] if len({part.labels.get(name, "") for part in parts}) > 1]
-    heads = ["result"] * bool(batch.limits) + labels
-    row_limit = max(1, _MOST_CELLS // (len(heads) + len(batch.quantities) + (4 if has_curves else 1)))
+    columns = bool(batch.limits) + len(labels) + len(batch.quantities) + (4 if has_curves else 1)
+    row_limit = max(1, _MOST_CELLS // columns)
     ordered = sorted(range(len(parts)), key=lambda index: _ORDER.index(status[index]))
     important = sum(map(bool, status))
     first, ordinary = ordered[: min(important, row_limit)], ordered[important:]
@@ -65,26 +65,11 @@ def index_page(batch: BatchFile, folder: Path, base: str = "") -> str:
     warnings = list(dict.fromkeys(line for index in chosen for line in parts[index].warnings))
     rows = []
     for index in chosen:
-        part = parts[index]
-        mean = 100.0 * float(np.expm1(np.log1p(relative[index]).mean())) if has_curves else np.nan
-        remarks = [part.error, part.poor_fit and "poor fit", part.differs and f"differs: {part.differs}"]
-        remarks += [] if part.poor_fit else part.doubtful.values()
-        if numbers := ", ".join(str(warnings.index(line) + 1) for line in part.warnings):
-            remarks.append(f"see warning{'s' * (len(part.warnings) > 1)} {numbers}")
-        color = _DIFFERENT if part.deviations else _USUAL
-        tones = ["bad" if name in part.misses else "fair" * (name in part.deviations) for name, _ in units.values()]
-        values = ["" if value is None else number(value, 4) for value in part.values]
-        rows.append(
-            {
-                "part": part,
-                "link": links[index],
-                "texts": [part.result or ""] * bool(batch.limits) + [part.labels.get(name, "") for name in labels],
-                "curve": sparkline(relative[index], relative[usual], scale, color) if np.isfinite(mean) else "",
-                "deviation": f"{mean:+.1f}" if np.isfinite(mean) else "",
-                "cells": list(zip(values, tones, strict=True)),
-                "remarks": "; ".join(filter(None, remarks)),
-            }
-        )
+        part, curve, deviation = parts[index], Markup(""), ""
+        if has_curves and np.isfinite(relative[index]).all():
+            curve = sparkline(relative[index], relative[usual], scale, _DIFFERENT if part.deviations else _USUAL)
+            deviation = f"{100.0 * np.expm1(np.log1p(relative[index]).mean()):+.1f}"
+        rows.append((part, links[index], curve, deviation))
     pictures = []
     if has_curves:
         singles = {part.name: curves[k] for k, part in enumerate(parts) if part.curve and not usual[k]}
@@ -94,21 +79,13 @@ def index_page(batch: BatchFile, folder: Path, base: str = "") -> str:
     compared = [table for table in tables if table.detectable] or tables
     context: dict[str, Any] = {
         "batch": batch,
-        "bad": bool(batch.missed or batch.failed),
-        "results": [(result, batch.limits[result]) for result in reversed(_TONES) if result in batch.limits],
-        "fails": [*listed["fail"], *listed["conditional fail"]][:_MOST_NAMED],
-        "unjudged": listed["not judged"][:_MOST_NAMED],
-        "errors": listed["error"][:_MOST_NAMED],
-        "differing": listed["differs"][:_MOST_NAMED],
+        "listed": listed | {"fail": [*listed["fail"], *listed["conditional fail"]]},
         "most_named": _MOST_NAMED,
         "parts_compared": max((table.parts for table in compared), default=0),
-        "quantities": [
-            (table, units[header][0], "" if units[header][1] in (None, "-") else f" {units[header][1]}")
-            for header, table in batch.quantities.items()
-        ],
+        "units": units,
         "scale": scale,
         "pictures": pictures,
-        "heads": heads,
+        "labels": labels,
         "columns": ["measured stiffness, deviation [%]"] * has_curves + [*batch.quantities],
         "rows": rows,
         "warnings": warnings,
