@@ -26,7 +26,6 @@ _DIFFERENT, _USUAL = "#b4500c", "#1f4e9c"
 _ORDER = ("error", "fail", "conditional fail", "not judged", "differs", "conditional pass", "")
 #: Text columns that the table of parts contains if they differ between parts (the first: also from the part's name).
 _LABELS = ("campaign name", "subgroup", "verdict", "named effects", "on a bound")
-_TONES = {"pass": "good", "conditional pass": "fair", "not judged": "fair", "conditional fail": "bad", "fail": "bad"}
 
 
 def index_page(batch: BatchFile, folder: Path, base: str = "") -> str:
@@ -90,7 +89,6 @@ def index_page(batch: BatchFile, folder: Path, base: str = "") -> str:
         "rows": rows,
         "warnings": warnings,
         "shown": (len(first), important, len(chosen) - len(first)),
-        "tones": _TONES,
     }
     return render_page("index.html", context)
 
