@@ -96,12 +96,13 @@ def _print_comparison(output: Output, name: str, compared: ComparisonOutput) -> 
     """Print which results differ by more than chance, the next step, the sources of the results, and tables."""
     from bushfit.report.compared import FAMILY_HEADS, ComparisonDocument, format_p_value, parameter_cells
 
-    first, *labels = compared.labels
-    if compared.families:
+    document, families = compared.document, compared.document["families"]
+    first, *labels = (entry["label"] for entry in document["compared"])
+    if families:
         verdict, *advice = compared.advice
-        best = max(compared.families, key=lambda family: family.probability)
-        effects = "" if best is compared.families[0] else "".join(f" --effect {name}" for name in best.name.split("+"))
-        action = f"next: bushfit fit {quote_path(Path(compared.entries[0].source))}{effects}"
+        best = max(families, key=lambda family: family["probability"])
+        effects = "" if best is families[0] else "".join(f" --effect {name}" for name in best["name"].split("+"))
+        action = f"next: bushfit fit {quote_path(Path(document['compared'][0]['source']))}{effects}"
         sentences = [*advice, *compared.notes, *(compared.words if output.verbose else ())]
     else:
         different = []
@@ -117,9 +118,9 @@ def _print_comparison(output: Output, name: str, compared: ComparisonOutput) -> 
     output.print_headline(name, verdict, action)
     for sentence in sentences:
         output.print(sentence)
-    for label, entry in zip(compared.labels, compared.entries, strict=True):
-        output.print(f"{label}: {entry.name} ({entry.source})")
-    detailed = compared.comparisons if output.verbose or not compared.families else ()
+    for entry in document["compared"]:
+        output.print(f"{entry['label']}: {entry['name']} ({entry['source']})")
+    detailed = compared.comparisons if output.verbose or not families else ()
     for label, comparison in zip(labels, detailed, strict=False):
         title = f"parameters of {label} against {first}; p: probability of such a difference by chance (Holm)"
         columns = ("parameter", first, label, "difference", "95 % interval", "p", "unit")
@@ -127,7 +128,7 @@ def _print_comparison(output: Output, name: str, compared: ComparisonOutput) -> 
         if comparison.joint:
             p, count = comparison.joint
             output.print(f"all {count} together, with correlations: p {format_p_value(p)}")
-    if compared.families:
+    if families:
         title = "families; held out: root mean square in units of noise (1: noise alone)"
-        output.print_table(title, FAMILY_HEADS, ComparisonDocument.from_document(compared.document).family_cells())
+        output.print_table(title, FAMILY_HEADS, ComparisonDocument.from_document(document).family_cells())
     output.warn(line for line in compared.warnings if line not in compared.notes)

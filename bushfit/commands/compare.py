@@ -64,22 +64,16 @@ class ComparisonOutput:
     """Output of the command compare: compared results or model families, sentences, and result files.
 
     Args:
-        entries: compared results, the reference first.
         comparisons: comparison of each further result with the reference.
-        families: fitted model families; empty when results are compared.
-        labels: letters of the results in tables and sentences: A, B and so on.
-        advice: sentences on the family to use, and on how well each family predicts held-out data.
+        advice: sentences on the family to use, and on how well each family predicts held-out data; empty for results.
         words: sentences on the differences, one for each result and direction.
-        notes: further warnings.
+        notes: warnings on the families.
         warnings: all warnings without repetition, each with the letters of the results that it concerns.
         document: content of compare.json.
         files: document, tables, figure and page.
     """
 
-    entries: Sequence[ComparedResult]
     comparisons: Sequence[Comparison]
-    families: Sequence[FittedFamily]
-    labels: Sequence[str]
     advice: Sequence[str]
     words: Sequence[str]
     notes: Sequence[str]
@@ -88,7 +82,7 @@ class ComparisonOutput:
     files: Sequence[ResultFile]
 
     def __repr__(self) -> str:
-        return f"Comparison of {', '.join(entry.name for entry in self.entries)}"
+        return f"Comparison of {', '.join(entry['name'] for entry in self.document['compared'])}"
 
 
 def compare(
@@ -226,13 +220,13 @@ def _compared(
         "versions": {"bushfit": __version__, **versions()},
     }
     document = to_json_data(records, ComparisonFile)
-    side_by_side = ComparisonDocument.from_document(document)
+    table = ComparisonDocument.from_document(document)
     names = ("parameters", *(["families"] if families else []), "differences")
-    figure = ResultFile("compare", "figure", lambda: plots.comparison.comparison_figure(side_by_side))
+    figure = ResultFile("compare", "figure", lambda: plots.comparison.comparison_figure(table))
     files = [ResultFile("compare", "json", document), figure]
-    files += [ResultFile(name, "table", partial(lambda name: side_by_side.tables()[name], name)) for name in names]
-    files.append(ResultFile("compare", "page", partial(comparison_page, side_by_side, figure)))
-    return ComparisonOutput(entries, comparisons, families, labels, advice, words, notes, warnings, document, files)
+    files += [ResultFile(name, "table", partial(lambda name: table.tables()[name], name)) for name in names]
+    files.append(ResultFile("compare", "page", partial(comparison_page, table, figure)))
+    return ComparisonOutput(comparisons, advice, words, notes, warnings, document, files)
 
 
 def _warnings(

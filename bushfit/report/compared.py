@@ -18,7 +18,7 @@ from bushfit.model.file import require_schema
 from bushfit.prediction.comparison import Comparison, Contrast
 from bushfit.prediction.parameter_comparison import ParameterContrast, relative_difference
 from bushfit.report.compare_document import SCHEMA, ComparisonFile
-from bushfit.report.tables import band_columns, quantity_words, require_columns, response_headers
+from bushfit.report.tables import require_columns, response_headers
 from bushfit.units import display_unit, number, split_header
 from bushfit.validation import validate_tables
 
@@ -28,6 +28,8 @@ _DIGITS, _MOST_DECIMALS = 4, 6
 _OPEN = 1e7
 #: Smallest probability that is written as a number; smaller ones are written as "< 0.001".
 _LEAST_PROBABILITY = 1e-3
+#: Column header of the loss factor.
+LOSS = "loss factor [-]"
 #: Column headers of the rows of `ComparisonDocument.family_cells`.
 FAMILY_HEADS = ("family", "parameters", "NRMSE", "χ²", "probability", "held out", "first, held out", "parts")
 
@@ -44,23 +46,24 @@ def contrast_table(comparison: Comparison, contrast: Contrast) -> pd.DataFrame:
         ("..., low" and "..., high"), and "yes" or "no" for a significant difference ("..., sure").
     """
     (_, length), _, (_, factor) = contrast.place.display
-    amplitude, name, _ = response_headers(contrast.place)
-    columns: dict[str, Any] = {
-        "frequency [Hz]": contrast.reference.frequency,
-        amplitude: contrast.reference.amplitude * length,
-    }
-    for label, side in (("reference", contrast.reference), ("other", contrast.other)):
-        for quantity, band, scale in ((name, side.stiffness, factor), ("loss factor [-]", side.loss_factor, 1.0)):
-            columns |= band_columns(f"{label} {quantity}", band, scale)
-    differences = (
-        (f"relative difference of {quantity_words(contrast.place)[2]} [-]", contrast.stiffness, relative_difference),
-        ("difference of loss factor [-]", contrast.loss_factor, np.asarray),
-    )
-    for header, band, convert in differences:
-        significant = np.where(comparison.significant(band), "yes", "no")
-        columns |= {header: convert(band.value), f"{header}, low": convert(band.low)}
-        columns |= {f"{header}, high": convert(band.high), f"{header}, sure": significant}
-    return pd.DataFrame(columns)
+    columns: list[Any] = [contrast.reference.frequency, contrast.reference.amplitude * length]
+    for side in (contrast.reference, contrast.other):
+        for band, scale in ((side.stiffness, factor), (side.loss_factor, 1.0)):
+            columns += [scale * values for values in (band.value, band.low, band.high)]
+    for band, convert in ((contrast.stiffness, relative_difference), (contrast.loss_factor, np.asarray)):
+        columns += [convert(values) for values in (band.value, band.low, band.high)]
+        columns.append(np.where(comparison.significant(band), "yes", "no"))
+    headers = contrast_headers(*response_headers(contrast.place)[:2])
+    return pd.DataFrame(dict(zip(headers, columns, strict=True)))
+
+
+def contrast_headers(amplitude: str, stiffness: str) -> list[str]:
+    """Headers of the columns of `contrast_table`, from those of the amplitude and of the stiffness (or modulus)."""
+    ends = ("", ", low", ", high")
+    sides = [f"{side} {name}" for side in ("reference", "other") for name in (stiffness, LOSS)]
+    differences = (f"relative difference of {split_header(stiffness)[0]} [-]", f"difference of {LOSS}")
+    headers = ["frequency [Hz]", amplitude, *(f"{name}{end}" for name in sides for end in ends)]
+    return [*headers, *(f"{name}{end}" for name in differences for end in (*ends, ", sure"))]
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,8 +78,6 @@ class PlaceDifferences:
             "yes" or "no" for a significant difference.
         amplitude: header of the amplitude.
         stiffness: header of the stiffness or modulus; in the table it follows "reference " or "other ".
-        relative: header of the relative difference of the stiffness or modulus.
-        loss: header of the difference of the loss factor.
     """
 
     label: str
@@ -84,8 +85,11 @@ class PlaceDifferences:
     table: pd.DataFrame
     amplitude: str
     stiffness: str
-    relative: str
-    loss: str = "difference of loss factor [-]"
+
+    @property
+    def changes(self) -> tuple[str, str]:
+        """Headers of the relative difference of the stiffness or modulus, and of the difference of the loss factor."""
+        return f"relative difference of {split_header(self.stiffness)[0]} [-]", f"difference of {LOSS}"
 
     @classmethod
     def from_columns(cls, label: str, place: str, columns: Mapping[str, Sequence[Any]]) -> PlaceDifferences:
@@ -113,15 +117,10 @@ class PlaceDifferences:
         types = dict.fromkeys(columns.keys() - {*texts}, float)
         table = pd.DataFrame({"other": label, "place": place, **columns}).astype(types)
         amplitude = next((name for name in columns if split_header(name)[0].endswith("amplitude")), "amplitude [mm]")
-        stiffness = next((name for name in columns if name.startswith("reference ")), "reference stiffness [N/mm]")
+        stiffness = next((name for name in columns if name.startswith("reference ")), "stiffness [N/mm]")
         stiffness = stiffness.removeprefix("reference ")
-        relative = f"relative difference of {split_header(stiffness)[0]} [-]"
-        differences = cls(label, place, table, amplitude, stiffness, relative)
-        names = (relative, differences.loss)
-        banded = [f"{side} {name}" for side in ("reference", "other") for name in (stiffness, "loss factor [-]")]
-        ends = [f"{name}{end}" for name in (*banded, *names) for end in ("", ", low", ", high")]
-        require_columns(table, "frequency [Hz]", amplitude, *ends, *(f"{name}, sure" for name in names))
-        return differences
+        require_columns(table, *contrast_headers(amplitude, stiffness))
+        return cls(label, place, table, amplitude, stiffness)
 
     def band(self, header: str) -> Array:
         """Value, low and high end of the 95 % band of the column `header`, (3, n), in the unit of the header."""

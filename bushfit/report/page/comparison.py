@@ -8,6 +8,7 @@ import numpy as np
 from bushfit.report import plots
 from bushfit.report.compared import (
     FAMILY_HEADS,
+    LOSS,
     ComparisonDocument,
     PlaceDifferences,
     format_difference,
@@ -90,7 +91,7 @@ def difference_sizes(one: PlaceDifferences) -> dict[str, str]:
         points (`stiffness_sure`, `loss_sure`).
     """
     row, table = {"label": one.label, "place": one.place}, one.table
-    for key, header, scale, unit in (("stiffness", one.relative, 100.0, " %"), ("loss", one.loss, 1.0, "")):
+    for key, header, scale, unit in zip(("stiffness", "loss"), one.changes, (100.0, 1.0), (" %", ""), strict=True):
         values, low, high = scale * one.band(header)
         finite_ends = np.sort(values[np.isfinite(values)])[[0, -1]].tolist() if np.isfinite(values).any() else []
         ends = dict.fromkeys(format_difference(end, 0.1 * max(map(abs, finite_ends))) for end in finite_ends)
@@ -117,7 +118,8 @@ def value_rows(comparison: ComparisonDocument) -> Iterator[tuple[Any, ...]]:
     amplitudes = min(point_limit, _AMPLITUDES)
     for one in all_differences:
         (_, length), (_, unit) = split_header(one.amplitude), split_header(one.stiffness)
-        kinds = (one.stiffness, one.relative, f" {unit}", 100.0, " %"), ("loss factor [-]", one.loss, "", 1.0, "")
+        relative, loss = one.changes
+        kinds = (one.stiffness, relative, f" {unit}", 100.0, " %"), (LOSS, loss, "", 1.0, "")
         frequency, amplitude = one.grid()
         for index in spread_points(amplitude, frequency, amplitudes, min(point_limit // amplitudes, _FREQUENCIES)):
             row, cells = one.table.iloc[index], []

@@ -3,7 +3,7 @@
 import numpy as np
 from matplotlib.lines import Line2D
 
-from bushfit.report.compared import ComparisonDocument
+from bushfit.report.compared import LOSS, ComparisonDocument
 from bushfit.report.plots import style
 from bushfit.report.tables import shorten
 from bushfit.units import display_unit, format_range, split_header
@@ -45,9 +45,9 @@ def comparison_figure(comparison: ComparisonDocument) -> style.Chart:
         display, factor = display_unit(unit or "", 1.0, float(largest))
         panels = (
             (reference.stiffness, f"{place} {name} [{display}]", factor, values, 0.0),
-            ("loss factor [-]", f"{place} loss factor [-]", 1.0, values, 0.0),
-            (reference.relative, f"{name} minus {first} [% of {first}]", 100.0, changes, _LEAST_PERCENT),
-            (reference.loss, f"loss factor minus {first} [-]", 1.0, changes, _LEAST_LOSS),
+            (LOSS, f"{place} loss factor [-]", 1.0, values, 0.0),
+            (reference.changes[0], f"{name} minus {first} [% of {first}]", 100.0, changes, _LEAST_PERCENT),
+            (reference.changes[1], f"loss factor minus {first} [-]", 1.0, changes, _LEAST_LOSS),
         )
         of_place = grid[2 * row : 2 * row + 2].flat
         for axes, (header, y_label, scale, sides, least_span) in zip(of_place, panels, strict=True):
