@@ -56,7 +56,7 @@ def command(
     families.csv.
     """
     from bushfit.campaign.campaign import Campaign, load_campaign
-    from bushfit.commands.compare import MOST, compare, compared_result
+    from bushfit.commands.compare import MOST, ComparedResult, compare, compared_result
     from bushfit.commands.loading import load_source, model_file, model_source
     from bushfit.commands.provenance import command_line, option_words
     from bushfit.effects import get_effect
@@ -68,25 +68,23 @@ def command(
     texts = {key: grid.text if grid else None for key, grid in grids.items()}
     words = option_words(families=families, direction=directions, preload=preload, **texts)
     settings: dict[str, Any] = {**grids, "directions": directions, "preload": preload}
+    entries: list[Campaign | ComparedResult] = []
     settings["command"] = command_line("compare", *map(str, sources), *words)
     if families is not None:
         names = () if families == _ALL else tuple(name.replace(" ", "") for name in families.split(","))
         with error_location(place="--families"):
             for name in names:
                 all(map(get_effect, name.split("+")))
-        campaign = load_campaign(sources[0])
-        name = campaign.name
-        folder = output.folder(name, "compare.json")
-        compared = compare(campaign, families=names, **settings)
+        settings["families"] = names
+        entries.append(load_campaign(sources[0]))
     else:
-        entries = []
         for source in track("results fitted", sources):
             loaded = load_source(source)
             digest = None if isinstance(loaded, Campaign) else model_source(model_file(source)).sha256
             entries.append(compared_result(loaded, str(source), digest, directions))
-        name = " and ".join(entry.name for entry in entries)
-        folder = output.folder(name, "compare.json")
-        compared = compare(*entries, **settings)
+    name = " and ".join(entry.name for entry in entries)
+    folder = output.folder(name, "compare.json")
+    compared = compare(*entries, **settings)
     _print_comparison(output, name, compared)
     inputs = [source if source.suffix == ".toml" else model_file(source) for source in sources]
     output.write(folder, compared.files, compared.document, inputs)

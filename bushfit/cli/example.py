@@ -16,13 +16,12 @@ def command(output: Output) -> None:
     Writes campaign.toml, the test files of a hysteresis loop and two sweeps, and truth.json (the simulated model).
     """
     from bushfit import simulation
-    from bushfit.campaign.campaign import load_campaign, model_of
-    from bushfit.commands.simulate import simulate_campaign
+    from bushfit.campaign.campaign import load_campaign
+    from bushfit.commands.simulate import simulate_campaign, simulated_tests
     from bushfit.errors import quote_path
 
     campaign = load_campaign(Path(simulation.__file__).with_name("example.toml"))
-    assert campaign.simulate  # which the file has
-    simulated = simulate_campaign(model_of(campaign), campaign.simulate, output.formats.table_form)
+    simulated = simulate_campaign(*simulated_tests(campaign), output.formats.table_form)
     folder = output.output or Path("bushfit-example")
     output.write(folder, simulated.files, simulated.document)
     output.print(f"next: bushfit run {quote_path(folder / 'campaign.toml')}")

@@ -14,6 +14,8 @@ from bushfit.errors import quote_path
 from bushfit.units import number
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from bushfit.campaign.schema import Loss
     from bushfit.commands.fit import FitOutput
 
@@ -39,9 +41,7 @@ def static(
     campaign, start = open_campaign(campaigns), load_model(dynamic) if dynamic else None
     folder = output.folder(campaign.name, "static.json")
     fitted = fit_static(campaign, dynamic=start, loss=loss)
-    _print_fit(output, folder, fitted)
-    output.write(folder, fitted.files, fitted.document, input_files(campaign, dynamic))
-    exit_above(max_nrmse, fitted.result)
+    _print_and_write(output, folder, fitted, input_files(campaign, dynamic), max_nrmse)
 
 
 @command_called("fit-dynamic", "configs/cmp_15961.toml")
@@ -71,9 +71,7 @@ def dynamic(
     campaign, start = open_campaign(campaigns), load_model(static) if static else None
     folder = output.folder(campaign.name, "dynamic.json")
     fitted = fit_dynamic(campaign, static=start, loss=loss)
-    _print_fit(output, folder, fitted)
-    output.write(folder, fitted.files, fitted.document, input_files(campaign, static))
-    exit_above(max_nrmse, fitted.result)
+    _print_and_write(output, folder, fitted, input_files(campaign, static), max_nrmse)
 
 
 @command_called("fit", "configs/arm_bushing.toml --direction axial --direction radial --profile")
@@ -114,18 +112,20 @@ def command(
     campaign = open_campaign(campaigns)
     folder = output.folder(campaign.name, "model.json")
     fitted = fit(campaign, directions=directions, effects=effects, profile=profile, loss=loss)
-    _print_fit(output, folder, fitted)
-    output.write(folder, fitted.files, fitted.document, input_files(campaign))
-    exit_above(max_nrmse, fitted.result)
+    _print_and_write(output, folder, fitted, input_files(campaign), max_nrmse)
 
 
-def _print_fit(output: Output, folder: Path, fitted: FitOutput) -> None:
-    """Print the result of a fit: verdict, next step, parameters, and the prediction of each of several bushings.
+def _print_and_write(
+    output: Output, folder: Path, fitted: FitOutput, inputs: Sequence[Path], max_nrmse: float | None
+) -> None:
+    """Print the result of a fit (verdict, next step, parameters, each of several bushings), and write its files.
 
     Args:
         output: output of the command.
         folder: results folder, which the next step names.
         fitted: result of the fit.
+        inputs: files that the command has read.
+        max_nrmse: misfit above which the command exits with status 1; None without a limit.
     """
     campaign, result, file = fitted.data.campaign, fitted.result, quote_path(fitted.data.campaign.path)
     written = quote_path(folder / f"{fitted.files[0].name}.json")
@@ -154,3 +154,5 @@ def _print_fit(output: Output, folder: Path, fitted: FitOutput) -> None:
         ]
         output.print_table("each bushing predicted by a fit to the others", list(table.columns), rows)
     output.warn(fitted.data.notes)
+    output.write(folder, fitted.files, fitted.document, inputs)
+    exit_above(max_nrmse, fitted.result)

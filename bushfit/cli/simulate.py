@@ -51,16 +51,12 @@ def command(source: Path, effects: tuple[str, ...], output: Output, **settings: 
 
     Writes campaign.toml, its test files, and truth.json (the model that was simulated).
     """
-    from bushfit.campaign.campaign import load_campaign, model_of
-    from bushfit.campaign.simulated import SimulateSettings
+    from bushfit.campaign.campaign import load_campaign
     from bushfit.commands.loading import load_model
-    from bushfit.commands.simulate import simulate_campaign
+    from bushfit.commands.simulate import simulate_campaign, simulated_tests
 
-    if source.suffix.lower() == ".json" or source.is_dir():
-        truth, tests = load_model(source).model, SimulateSettings()
-    else:
-        campaign = load_campaign(source)
-        truth, tests = model_of(campaign), campaign.simulate or SimulateSettings()
+    is_model = source.suffix.lower() == ".json" or source.is_dir()
+    truth, tests = simulated_tests(load_model(source) if is_model else load_campaign(source))
     changes = {name: value for name, value in settings.items() if value is not None}
     for text in effects:
         truth = _with_effect(truth, text)

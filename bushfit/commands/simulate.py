@@ -60,6 +60,13 @@ def simulate_campaign(truth: Model, settings: SimulateSettings, form: Form = "cs
     return SimulationOutput(simulated, document, files, warnings)
 
 
+def simulated_tests(source: Model | Result | HasResult | Campaign) -> tuple[Model, SimulateSettings]:
+    """Model to simulate, and its tests: those of the campaign's [simulate] table, otherwise those of the paper."""
+    if isinstance(source, Campaign):
+        return model_of(source), source.simulate or SimulateSettings()
+    return source if isinstance(source, Model) else as_result(source).model, SimulateSettings()
+
+
 def simulate(
     source: Model | Result | HasResult | Campaign, folder: str | Path, *, force: bool = False, **settings: Any
 ) -> Campaign:
@@ -78,10 +85,7 @@ def simulate(
     Raises:
         BushfitError: the source has no model, or files would be replaced.
     """
-    if isinstance(source, Campaign):
-        truth, tests = model_of(source), source.simulate or SimulateSettings()
-    else:
-        truth, tests = source if isinstance(source, Model) else as_result(source).model, SimulateSettings()
+    truth, tests = simulated_tests(source)
     output = simulate_campaign(truth, replace(tests, **settings))
     inputs = [source.path] if isinstance(source, Campaign) else []
     write_results(Path(folder), output.files, overwrite=force, inputs=inputs)

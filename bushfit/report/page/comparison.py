@@ -41,12 +41,7 @@ def comparison_page(comparison: ComparisonDocument, chart: ResultFile | None = N
         The page as HTML.
     """
     document, names, differences = comparison.document, comparison.names, comparison.differences
-    compared, (reference, *other_names) = document["compared"], names.values()
-    title, bushing = f"{len(other_names)} results and {reference}", compared[0]["bushing"]
-    if families := bool(document["families"]):
-        title = f"Model families of {bushing.name if bushing else compared[0]['source']}"
-    elif len(other_names) == 1:
-        title = f"{other_names[0]} compared with {reference}"
+    compared = document["compared"]
     conditions = [summarize_conditions(source.conditions for source in entry["inputs"]) for entry in compared]
     labels: dict[tuple[str, str], list[str]] = {}
     for entry in compared:
@@ -64,13 +59,11 @@ def comparison_page(comparison: ComparisonDocument, chart: ResultFile | None = N
         "resisted": "modulus"
         if all(results[0].stiffness.startswith("modulus") for results in differences.values())
         else "stiffness",
-        "title": title,
         "entries": [{"of": entry, "conditions": stated} for entry, stated in zip(compared, conditions, strict=True)],
         "differ": [name for name in _CONDITIONS if len({stated[name] for stated in conditions}) > 1],
         "sizes": [difference_sizes(one) for of_place in differences.values() for one in of_place],
         "family_heads": FAMILY_HEADS,
         "family_rows": [*comparison.family_cells()],
-        "judged": families and len(other_names) + document["words"][0].startswith("use "),
         "most": MOST,
         "cells": parameter_cells,
         "chance": format_p_value,

@@ -14,7 +14,7 @@ from bushfit.diagnosis.record import format_odds
 from bushfit.effects.temperature import REFERENCE
 from bushfit.geometry import STRAINING, TRANSLATION
 from bushfit.model.result import Result
-from bushfit.prediction.caveats import by_importance, consequence_of, warnings_of
+from bushfit.prediction.caveats import agrees_within_noise, by_importance, consequence_of, warnings_of
 from bushfit.reading.measurement import SAME_TEMPERATURE
 from bushfit.report import plots
 from bushfit.report.page import render_page
@@ -78,7 +78,8 @@ def report_page(files: Sequence[ResultFile], date: str | None = None, folder: Pa
         "versions": record.versions,
         "head": {key.replace("_", " ").capitalize(): text for key, text in head.items()},
         "conditions": summarize_conditions(test.conditions for test in tests),
-        "headlines": [headline_texts(record, prediction) for prediction in predictions],
+        "headlines": [headline_texts(result, prediction) for prediction in predictions],
+        "agrees": agrees_within_noise,
         "sizes": effect_sizes,
         "odds": format_odds(diagnosis) if diagnosis else [],
         "pictures": pictures,

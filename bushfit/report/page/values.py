@@ -7,12 +7,11 @@ import numpy as np
 
 from bushfit.effects.contract import Array
 from bushfit.model.covariance import Z95
+from bushfit.model.result import Result
 from bushfit.prediction.bands import Band
-from bushfit.prediction.caveats import agrees_within_noise
 from bushfit.prediction.static_curve import static_curve, static_rate
 from bushfit.prediction.stiffness import Prediction, predict
 from bushfit.prediction.superposed import untimed_effects
-from bushfit.report.page.record import ReportRecord
 from bushfit.report.tables import spread_indices
 from bushfit.units import display_unit, format_aligned, format_range, number
 
@@ -22,7 +21,7 @@ _STATIC = 1.0
 _FREQUENCIES, _AMPLITUDES, _ROWS = 3, 2, 12
 
 
-def headline_texts(record: ReportRecord, prediction: Prediction) -> dict[str, str]:
+def headline_texts(result: Result, prediction: Prediction) -> dict[str, str]:
     """Key values of a direction or specimen for the top of a report, as texts.
 
     The operating point is the middle one of the predicted amplitudes and the frequency nearest to the geometric mean of
@@ -31,14 +30,14 @@ def headline_texts(record: ReportRecord, prediction: Prediction) -> dict[str, st
     stiffness; its interval includes the correlation of the two.
 
     Args:
-        record: input of the report.
+        result: final model.
         prediction: prediction for one direction or specimen.
 
     Returns:
         Texts with units by template variable: operating point, dynamic stiffness and loss with their 95 % bands, static
-        stiffness, dynamic stiffening, expected error, and the tests that the prediction is based on.
+        stiffness and dynamic stiffening.
     """
-    result, place = record.result, prediction.direction
+    place = prediction.direction
     (length, to_length), _, (name, factor) = place.display
     amplitudes, frequencies = np.unique(prediction.amplitude), np.unique(prediction.frequency)
     amplitude = float(amplitudes[(amplitudes.size - 1) // 2])
@@ -60,8 +59,6 @@ def headline_texts(record: ReportRecord, prediction: Prediction) -> dict[str, st
         "static": "not tested",
         "static_point": f"lowest frequency {number(lowest, 3)} Hz",
         "stiffening": "",
-        "accuracy": "",
-        "basis": describe_basis(record, str(place)),
     }
     if lowest < frequency and lowest <= _STATIC and not untimed_effects(result.model):
         curve = static_curve(result, place, amplitude, static_rate(result, place))
@@ -73,10 +70,6 @@ def headline_texts(record: ReportRecord, prediction: Prediction) -> dict[str, st
         row["static"], row["static_point"] = f"{format_aligned([static], 4)[0]} {unit}", f"at {curve.rate_text}"
         decimals = max(2, math.ceil(-math.log10(2.0 * half))) if half else 2  # the interval is not rounded to 0
         row["stiffening"] = f"{ratio:.{decimals}f}" + (f" ± {half:.{decimals}f}" if half else "")
-    if usable := next((one for one in result.usable if one.place == str(place)), None):
-        points_used = f"95 % of {usable.points} {'held-out ' if usable.held_out else ''}points"
-        errors = f"stiffness {number(100 * usable.stiffness, 2)} %, loss factor {number(usable.loss_factor, 2)}"
-        row["accuracy"] = f"{errors} ({points_used})"
     return row
 
 
@@ -95,36 +88,6 @@ def format_interval(values: Sequence[float], digits: int = 4) -> str:
     """Format (value, low, high) as "low to high" with the decimals of the value; empty if the interval has no width."""
     _, low, high = format_aligned(values, digits, minimum_digits=2)
     return f"{low} to {high}" if values[2] > values[1] else ""
-
-
-def describe_basis(record: ReportRecord, place: str) -> str:
-    """State from which tests a direction or specimen is predicted, and how far the model misses its unfitted tests.
-
-    Args:
-        record: input of the report.
-        place: name of the direction or specimen.
-
-    Returns:
-        The sentence, without a full stop.
-    """
-    fitted = record.result.measured.directions if record.result.measured else ()
-    if place in fitted:
-        return (
-            "fitted to tests in this direction"
-            if record.result.place(place).axis
-            else "fitted to tests of this specimen"
-        )
-    tests = [test for test in record.result.tests if test.place == place and test.held is None and not test.fitted]
-    source = f"predicted from {' and '.join(fitted)} tests" if fitted else "calculated from given parameters"
-    if not tests:
-        return f"{source}; not tested"
-    errors = [100.0 * test.nrmse for test in tests]
-    size = " to ".join(dict.fromkeys(number(end, 2) for end in (min(errors), max(errors))))
-    agrees, single = agrees_within_noise(record.result, record.result.place(place)), len(tests) == 1
-    sweeps = "the measured sweep" if single else f"the {len(tests)} measured sweeps"
-    if agrees:
-        return f"{source}; {sweeps} {'agrees within its' if single else 'agree within their'} noise ({size} %)"
-    return f"{source}; {sweeps} differ{'s' * single} by {size} %"
 
 
 def value_rows(predictions: Sequence[Prediction]) -> Iterator[list[str]]:

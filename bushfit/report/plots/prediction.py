@@ -113,8 +113,7 @@ def static_figure(curves: Sequence[StaticCurve], title: str) -> style.Chart:
         for line in (one.loading, one.unloading):
             panels[0].plot(x, factor * line.value, color=look.color, lw=_THIN)
         for axes, band, scale in zip(panels, (one.mean, one.slope), (factor, slope_factor), strict=True):
-            axes.plot(x, scale * band.value, color=look.color, ls=look.dashes, lw=_LINE)
-            axes.fill_between(x, scale * band.low, scale * band.high, color=look.color, alpha=0.22, lw=0)
+            style.draw_band(axes, x, [scale * end for end in (band.value, band.low, band.high)], look, lw=_LINE)
     if len(curves) > 1:
         handles = [look.handle(False) for look in style.styles(len(curves), "loop")]
         style.legend(panels[1], handles, [one.preload.text(place) for one in curves if one.preload], "preload")
@@ -189,10 +188,9 @@ def draw_prediction(
         band = getattr(prediction, name)
         for look, index in zip(looks, chosen, strict=True):
             mask, rows = getattr(prediction, fixed) == levels[index], points_to_draw(points[index])
-            value, low, high = (from_si * end[mask] for end in (band.value, band.low, band.high))
-            marker = "_" if value.size == 1 else ""  # a single point is a stroke
-            axes.plot(x[mask], value, color=look.color, ls=look.dashes, lw=_LINE, marker=marker, ms=14.0)
-            axes.fill_between(x[mask], low, high, color=look.color, alpha=0.22, lw=0)
+            ends = [from_si * end[mask] for end in (band.value, band.low, band.high)]
+            marker = "_" if mask.sum() == 1 else ""  # a single point is a stroke
+            style.draw_band(axes, x[mask], ends, look, lw=_LINE, marker=marker, ms=14.0)
             if prediction.if_rigs is not None:
                 value = from_si * getattr(prediction.if_rigs, name).value[mask]
                 axes.plot(x[mask], value, color=look.color, lw=_DOUBLE)

@@ -43,14 +43,12 @@ def preload_figure(
     figure = style.Chart(title, style.ROW)
     pair, unit = figure.subplots(1, 2), preloads[0].in_display_unit(place)[1]
     factor = label_response(pair, place, max(float(one.stiffness.value.max()) for one in fine), f"preload [{unit}]")
-    quantities = (("stiffness", factor), ("loss_factor", 1.0))
-    for axes, (name, scale) in zip(pair, quantities, strict=True):
+    over_load = np.array([preload.in_display_unit(place)[0] for preload in loads])
+    for axes, name, scale in zip(pair, ("stiffness", "loss_factor"), (factor, 1.0), strict=True):
+        bands = [getattr(prediction, name) for prediction in fine]
+        curves = scale * np.array([[band.value, band.low, band.high] for band in bands])
         for index, look in enumerate(style.styles(amplitudes.size, "amplitude")):
-            bands = [getattr(prediction, name) for prediction in fine]
-            x = [preload.in_display_unit(place)[0] for preload in loads]
-            axes.plot(x, [scale * band.value[index] for band in bands], color=look.color, ls=look.dashes)
-            low, high = ([scale * getattr(band, end)[index] for band in bands] for end in ("low", "high"))
-            axes.fill_between(x, low, high, color=look.color, alpha=0.22, lw=0)
+            style.draw_band(axes, over_load, [*curves[:, :, index].T], look)
             for prediction, preload in zip(predictions, preloads, strict=True):
                 if prediction.measured is not None:  # nan, which is not drawn, without a measurement
                     mask = (prediction.frequency == frequency) & (prediction.amplitude == amplitudes[index])

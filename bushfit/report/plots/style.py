@@ -254,6 +254,21 @@ def noise_band(axes: Axes) -> None:
     widen_span(axes, 7.0)
 
 
+def draw_band(axes: Axes, x: Array, band: Sequence[Array], look: Style, **options: Any) -> None:
+    """Draw a predicted quantity as a line in its shaded 95 % band.
+
+    Args:
+        axes: panel.
+        x: values along x in the unit of the panel, (n,).
+        band: value, low and high end in the unit of the panel, (n,) each.
+        look: colour and line style.
+        **options: further properties of the line.
+    """
+    value, low, high = band
+    axes.plot(x, value, color=look.color, ls=look.dashes, **options)
+    axes.fill_between(x, low, high, color=look.color, alpha=0.22, lw=0)
+
+
 def mark_outliers(axes: Axes, x: Array, y: Array) -> None:
     """Draw crosses at outliers; those outside the limits of the panel are drawn at its edge.
 
