@@ -115,7 +115,7 @@ def command(
         outcome = plan(opened, settings_campaign, aim=aim or implied, targets=dict(targets), **settings)
     _print_plan(output, outcome)
     output.write(folder, outcome.files, outcome.document, [source, *([campaign] if campaign else [])])
-    if outcome.plan.planned.tests:
+    if outcome.plan.tests:
         output.print(f"next: make the tests in the order of {folder / output.formats.table('plan')}")
     if missed := [name for name, target in outcome.document["targets"].items() if not target["met"]]:
         click.echo(f"bushfit: these targets are not met: {', '.join(missed)}", err=True)
@@ -175,15 +175,15 @@ def _print_tests(output: Output, outcome: PlanOutput) -> None:
     from bushfit.campaign.simulated import SimulatedLoop
     from bushfit.planning.contract import amplitudes_and_frequencies
 
-    programme, rows = outcome.plan.planned, []
-    for test, runs in Counter(programme.tests).items():
+    tests, rows = outcome.plan.tests, []
+    for test, runs in Counter(tests).items():
         unit, factor = test.direction.display.displacement
         sizes, rates = amplitudes_and_frequencies(test)
         kind = f"loop, {test.cycles} cycles" if isinstance(test, SimulatedLoop) else f"sweep over {test.stepped}"
         motion = f"{_listed(sizes, factor)} {unit}", _listed(rates, 1.0)
         rows.append((str(test.direction), kind, *motion, str(runs)))
     columns = ("direction", "test", "amplitude", "frequency [Hz]", "runs")
-    output.print_table(f"{len(programme.tests)} runs", columns, rows, text_columns=4)
+    output.print_table(f"{len(tests)} runs", columns, rows, text_columns=4)
 
 
 def _listed(values: Sequence[float], factor: float) -> str:

@@ -4,7 +4,6 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from itertools import chain
 from typing import Unpack
 
 import numpy as np
@@ -21,9 +20,10 @@ from bushfit.geometry import default_places, get_places
 from bushfit.model.result import Result
 from bushfit.planning.campaign import campaign_toml
 from bushfit.planning.compound import guess_parameters
-from bushfit.planning.contract import Aim, Knowledge, Plan, PlanRequest, PredictionGrid, Target, Test, operating_points
-from bushfit.planning.document import PlanFile, plan_document
+from bushfit.planning.contract import Aim, Knowledge, PlanRequest, PredictionGrid, Test, operating_points
+from bushfit.planning.document import PlanFile
 from bushfit.planning.knowledge import from_campaign, from_result, with_rig_class
+from bushfit.planning.plan import Plan
 from bushfit.planning.plan import plan as choose_tests
 from bushfit.prediction.grid import default_grid, grid_settings, requested_grid
 from bushfit.report.results import ResultFile
@@ -111,15 +111,16 @@ def plan(
         for place in wanted_places or default
     )
     rig = with_rig_class(campaign.rig if campaign else RigSettings(), knowledge.noise)
-    named = (_targets(name, half, knowledge, grids) for name, half in (targets or {}).items())
-    wanted = tuple(chain.from_iterable(named))
+    wanted = dict[str, float]()
+    for name, half_width in (targets or {}).items():
+        for target in _targets(name, knowledge, grids):
+            wanted[target] = min(half_width, wanted.get(target, half_width))
     request = PlanRequest(aim, hours, rig, places, grids, tuple(parameters) or knowledge.names, wanted)
     chosen = choose_tests(knowledge, request)
-    document = plan_document(chosen)
-    files = [ResultFile("plan", "json", document), ResultFile("plan", "table", partial(plan_sheet, chosen))]
-    if chosen.planned.tests:
-        files.append(ResultFile(CAMPAIGN_FILE, "raw", campaign_toml(chosen).encode()))
-    return PlanOutput(chosen, document, files)
+    files = [ResultFile("plan", "json", chosen.document), ResultFile("plan", "table", partial(plan_sheet, chosen))]
+    if chosen.tests:
+        files.append(ResultFile(CAMPAIGN_FILE, "raw", campaign_toml(knowledge, chosen.tests).encode()))
+    return PlanOutput(chosen, chosen.document, files)
 
 
 def _knowledge(source: Campaign | Result | Knowledge, rivals: Sequence[str] | None) -> Knowledge:
@@ -140,19 +141,18 @@ def _knowledge(source: Campaign | Result | Knowledge, rivals: Sequence[str] | No
     return from_result(Result(model_of(source), specimens=source.specimens))
 
 
-def _targets(name: str, half_width: float, knowledge: Knowledge, grids: Sequence[PredictionGrid]) -> list[Target]:
-    """List the targets of a plan that a name selects: "mu", "stiffness" (all directions) or "stiffness.axial".
+def _targets(name: str, knowledge: Knowledge, grids: Sequence[PredictionGrid]) -> list[str]:
+    """List the quantities that a target names: "mu", "stiffness" (all directions) or "stiffness.axial".
 
     Args:
         name: name of a parameter or prediction, with or without a direction.
-        half_width: half-width that the 95 % interval shall reach, relative to the value.
         knowledge: knowledge before the tests, with the names of the parameters.
         grids: operating points of the predictions.
     """
-    possible = {parameter: [Target(parameter, half_width)] for parameter in knowledge.names}
+    possible = {parameter: [parameter] for parameter in knowledge.names}
     for quantity in PREDICTED:
-        targets = [Target(quantity, half_width, grid.place) for grid in grids]
-        possible |= {quantity: targets, **{str(target): [target] for target in targets}}
+        predictions = [f"{quantity}.{grid.place}" for grid in grids]
+        possible |= {quantity: predictions, **{prediction: [prediction] for prediction in predictions}}
     if name not in possible:
         expected, hint = ", ".join(possible), did_you_mean(name, tuple(possible))
         raise ModelError("there is no such target", place="--target", found=name, expected=expected, hint=hint)
@@ -170,9 +170,9 @@ def plan_sheet(plan: Plan) -> pd.DataFrame:
     Returns:
         Table of texts, with durations [min].
     """
-    tests = plan.planned.tests
-    counts, repeats, rows = Counter(tests), Counter[Test](), []
-    for order, (test, minutes) in enumerate(zip(tests, plan.planned.minutes, strict=True), start=1):
+    counts, repeats, rows = Counter(plan.tests), Counter[Test](), []
+    durations = np.array([run["minutes"] for run in plan.document["tests"]])
+    for order, test in enumerate(plan.tests, start=1):
         repeats[test] += 1
         (frequency, amplitude), (length, force, _) = operating_points(test), test.direction.display
         stiffness = np.abs(plan.knowledge.model.stiffness(test.direction, frequency, amplitude))
@@ -187,8 +187,8 @@ def plan_sheet(plan: Plan) -> pd.DataFrame:
                 "cycles": str(test.cycles) if isinstance(test, SimulatedLoop) else "until steady",
                 "repeat": f"{repeats[test]} of {counts[test]}",
                 "force up to": f"{largest} {force.name}",
-                "minutes": round(float(minutes), 1),
-                "minutes so far": round(float(np.sum(plan.planned.minutes[:order])), 1),
+                "minutes": round(float(durations[order - 1]), 1),
+                "minutes so far": round(float(np.sum(durations[:order])), 1),
                 "what for": plan.purposes[test],
             }
         )

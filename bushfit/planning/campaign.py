@@ -11,7 +11,7 @@ from bushfit.campaign.simulated import SimulatedLoop, SimulatedSweep, SimulateSe
 from bushfit.campaign.toml import body_lines, place_lines, toml_value
 from bushfit.effects import BASE, qualified_name
 from bushfit.geometry import Specimen, Unit
-from bushfit.planning.contract import Noise, Plan, Test
+from bushfit.planning.contract import Knowledge, Noise, Test
 
 #: Unit and factor from SI of the numbers with a unit in [simulate] and its tests, by key, beside amplitudes.
 _UNITS = {
@@ -50,14 +50,17 @@ def simulation_settings(tests: Sequence[Test], noise: Noise) -> SimulateSettings
     )
 
 
-def campaign_toml(plan: Plan) -> str:
-    """Format the planned tests as a campaign for `bushfit simulate`, with the model of the plan.
+def campaign_toml(knowledge: Knowledge, planned: Sequence[Test]) -> str:
+    """Format planned tests as a campaign for `bushfit simulate`.
+
+    Args:
+        knowledge: model and noise of the plan.
+        planned: runs of the plan.
 
     Returns:
         Content of the campaign file, in TOML.
     """
-    knowledge, settings = plan.knowledge, simulation_settings(plan.planned.tests, plan.knowledge.noise)
-    tested = [test.direction for test in plan.planned.tests]
+    settings, tested = simulation_settings(planned, knowledge.noise), [test.direction for test in planned]
     lines = [
         "# Planned by bushfit plan; bushfit simulate computes these tests from the model below. No rubber was tested.",
         "# All repeats of a sweep follow each other here; the order on the rig is that of the sheet.",

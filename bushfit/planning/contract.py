@@ -1,4 +1,4 @@
-"""Records of a plan: the knowledge before it, its aim, and the expected results of tests.
+"""Input of a plan: the knowledge before it, and its aim.
 
 A test is one run of the rig: a stepped sine at one amplitude or one frequency (`SimulatedSweep`), or a hysteresis loop
 (`SimulatedLoop`). A repeated test is listed again. Standard errors of parameters are those of relative changes (ln of
@@ -133,25 +133,6 @@ class PredictionGrid:
     amplitudes: Array
 
 
-@dataclass(frozen=True)
-class Target:
-    """Accuracy that a user asks a plan to reach: largest 95 % interval of a parameter or of a prediction.
-
-    Args:
-        quantity: name of a parameter, or "stiffness" or "loss_factor".
-        half_width: largest half width of the 95 % interval, relative to the value; for a prediction, at every operating
-            point of the request.
-        place: direction or specimen of the prediction; None for a parameter.
-    """
-
-    quantity: str
-    half_width: float
-    place: Place | None = None
-
-    def __str__(self) -> str:
-        return self.quantity if self.place is None else f"{self.quantity}.{self.place}"
-
-
 @dataclass(frozen=True, eq=False)
 class PlanRequest:
     """Aim of a plan, with the hours and limits of the rig.
@@ -163,7 +144,8 @@ class PlanRequest:
         places: directions or specimens that the rig can test.
         grids: operating points at which the plan reports the errors of the stiffness, whatever the aim.
         parameters: names of the parameters whose errors aim "parameters" minimises.
-        targets: targets of aim "targets", which plans no further test once the targets are met.
+        targets: largest half width of the 95 % interval, relative to the value, by name of a parameter ("mu") or of a
+            prediction ("stiffness.axial"). Aim "targets" plans no further test once the targets are met.
     """
 
     aim: Aim
@@ -172,62 +154,4 @@ class PlanRequest:
     places: tuple[Place, ...]
     grids: tuple[PredictionGrid, ...]
     parameters: tuple[str, ...] = ()
-    targets: tuple[Target, ...] = ()
-
-
-@dataclass(frozen=True, eq=False)
-class Programme:
-    """Sequence of tests with their durations, and the accuracy expected from these tests and those so far.
-
-    Args:
-        tests: runs of the rig, in the order in which they are made.
-        minutes: duration of each test with the change of direction before it [min], (tests,).
-        errors: standard error of each parameter's relative change, (k,).
-        predictions: standard error at each operating point of the request: relative error of |K| by names such as
-            "stiffness.axial", absolute error of the loss factor by names such as "loss_factor.axial", (n,) each.
-        rival_chi_square: expected chi-square between the two nearest rivals that can be separated, after the best
-            refit of either; None without rivals.
-        half_widths: half width of the 95 % interval of each target, relative to the value, at its worst point.
-        detectable: smallest amount of each missing effect that these tests detect in 90 % of the cases [SI], by the
-            effect's name; infinite if they detect none.
-    """
-
-    tests: tuple[Test, ...]
-    minutes: Array
-    errors: Array
-    predictions: Mapping[str, Array]
-    rival_chi_square: float | None
-    half_widths: tuple[float, ...]
-    detectable: Mapping[str, float]
-
-    @property
-    def hours(self) -> float:
-        """Total duration of the tests of the programme [h]."""
-        return float(np.sum(self.minutes)) / 60.0
-
-
-@dataclass(frozen=True, eq=False)
-class Plan:
-    """Tests chosen for an aim with their expected results, compared with the standard programme of as many hours.
-
-    Args:
-        knowledge: model, covariance and noise before the planned tests.
-        request: aim of the plan, with the hours and limits of the rig.
-        before: programme without tests, for comparison.
-        planned: programme of the chosen tests.
-        standard: programme of the paper's tests, repeated as often as the same hours allow.
-        purposes: sentence on the accuracy lost without a test and all its repeats, by test.
-        missed: reason why the planned tests miss each target; None for a target that they meet.
-        enough: reason why hours remain free; None if the hours are used.
-        notes: warnings and limits of the plan.
-    """
-
-    knowledge: Knowledge
-    request: PlanRequest
-    before: Programme
-    planned: Programme
-    standard: Programme
-    purposes: Mapping[Test, str]
-    missed: tuple[str | None, ...] = ()
-    enough: str | None = None
-    notes: tuple[str, ...] = ()
+    targets: Mapping[str, float] = field(default_factory=dict)

@@ -1,15 +1,16 @@
 """plan.json: the tests of a plan and their expected results."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Sequence
 from typing import Literal
 
-import numpy as np
 from typing_extensions import TypedDict
 
 from bushfit.campaign.simulated import SimulatedLoop
 from bushfit.effects import get_effect, qualified_name
-from bushfit.planning.contract import Aim, Plan, amplitudes_and_frequencies
-from bushfit.planning.search import RIVALS_APART
+from bushfit.effects.contract import Array
+from bushfit.planning.contract import Aim, Test, amplitudes_and_frequencies
+from bushfit.planning.search import RIVALS_APART, PlanSearch
+from bushfit.planning.targets import PlannedQuantity
 
 
 class PlannedRun(TypedDict):
@@ -137,82 +138,86 @@ class PlanFile(TypedDict):
     warnings: list[str]
 
 
-def plan_document(plan: Plan) -> PlanFile:
-    """Convert a plan to the content of plan.json.
+def plan_document(
+    search: PlanSearch, runs: Sequence[int], missed: Sequence[str | None], enough: str | None, warnings: Sequence[str]
+) -> PlanFile:
+    """Collect the content of plan.json.
+
+    Args:
+        search: search with the candidate tests.
+        runs: test indices of the plan in the order of the runs.
+        missed: reason why the plan misses each target; None for a target that it meets.
+        enough: reason why hours remain free; None if the hours are used.
+        warnings: warnings and limits of the plan.
 
     Returns:
         Keys and values of the file, in SI units.
     """
-    request, planned, standard = plan.request, plan.planned, plan.standard
-    programmes = (plan.before, planned, standard)
+    knowledge, request, minutes = search.knowledge, search.request, search.minutes_of(runs)
+    planned, standard = search.count_runs(runs), search.count_runs(search.standard_runs)
+    standard_amounts = search.detectable_amounts(standard)
+    covariances = [search.error_covariance(counts) for counts in (0 * planned, planned, standard)]
+
+    def compared(error: Callable[[Array], float]) -> ErrorComparison:
+        """Entry with an error by the covariance of the parameters: without tests, planned, standard."""
+        before, with_plan, with_standard = map(error, covariances)
+        return {"before": before, "planned": with_plan, "standard": with_standard}
+
+    errors: dict[str, dict[str, ErrorComparison]] = {"stiffness": {}, "loss_factor": {}}
+    for quantity in search.predictions:
+        errors[quantity.name.partition(".")[0]][str(quantity.place)] = compared(quantity.rms_error)
     rivals: Rivalry | None = None
-    if planned.rival_chi_square is not None and standard.rival_chi_square is not None:
+    if knowledge.rivals:
         rivals = {
-            "effects": [rival.model.effects[-1] for rival in plan.knowledge.rivals],
-            "planned": planned.rival_chi_square,
-            "standard": standard.rival_chi_square,
+            "effects": [rival.model.effects[-1] for rival in knowledge.rivals],
+            "planned": search.nearest_rivals(planned),
+            "standard": search.nearest_rivals(standard),
             "enough": RIVALS_APART,
         }
-    targets: dict[str, TargetEntry] = {}
-    halves = zip(*(programme.half_widths for programme in programmes), strict=True)
-    for target, reason, half in zip(request.targets, plan.missed, halves, strict=True):
-        targets[str(target)] = {
-            "asked": target.half_width,
-            **_error_comparison(half),
-            "met": reason is None,
-            "why": reason,
-        }
-    predicted: dict[str, dict[str, ErrorComparison]] = {"stiffness": {}, "loss_factor": {}}
-    for quantity, by_place in predicted.items():
-        for place in (str(grid.place) for grid in request.grids):
-            errors = (programme.predictions[f"{quantity}.{place}"] for programme in programmes)
-            by_place[place] = _error_comparison(np.sqrt(np.mean(np.square(error))) for error in errors)
-    visible: dict[str, DetectableEntry] = {}
-    for name, amount in planned.detectable.items():
-        effect, standard_amount = get_effect(name), standard.detectable[name]
-        visible[name] = {
-            "parameter": qualified_name(effect, effect.amount),
-            "unit": effect.amount.unit,
-            "planned": amount if np.isfinite(amount) else None,
-            "standard": standard_amount if np.isfinite(standard_amount) else None,
-        }
-    tests: list[PlannedRun] = []
-    for test, minutes in zip(planned.tests, planned.minutes.tolist(), strict=True):
-        amplitudes, frequencies = amplitudes_and_frequencies(test)
-        tests.append(
-            {
-                "place": str(test.direction),
-                "kind": "loop" if isinstance(test, SimulatedLoop) else "sweep",
-                "stepped": None if isinstance(test, SimulatedLoop) else test.stepped,
-                "amplitudes": list(amplitudes),
-                "unit": test.direction.motion.displacement_unit,
-                "frequencies_Hz": list(frequencies),
-                "cycles": test.cycles if isinstance(test, SimulatedLoop) else None,
-                "minutes": minutes,
-            }
-        )
-    parameter_errors = zip(plan.knowledge.names, *(programme.errors for programme in programmes), strict=True)
     return {
         "schema": "bushfit/plan/1",
-        "source": plan.knowledge.source,
+        "source": knowledge.source,
         "aim": request.aim,
         "hours": request.hours,
-        "tests": tests,
-        "hours_planned": planned.hours,
-        "hours_standard": standard.hours,
-        "hours_left": request.hours - planned.hours,
-        "enough": plan.enough,
-        "targets": targets,
-        "parameters": {name: _error_comparison(errors) for name, *errors in parameter_errors},
-        "stiffness": predicted["stiffness"],
-        "loss_factor": predicted["loss_factor"],
-        "visible": visible,
+        "tests": [planned_run(search.tests[run], duration) for run, duration in zip(runs, minutes, strict=True)],
+        "hours_planned": sum(minutes) / 60.0,
+        "hours_standard": sum(search.minutes_of(search.standard_runs)) / 60.0,
+        "hours_left": request.hours - sum(minutes) / 60.0,
+        "enough": enough,
+        "targets": {
+            goal.name: {"asked": goal.target, **compared(goal.half_width), "met": reason is None, "why": reason}
+            for goal, reason in zip(search.goals, missed, strict=True)
+        },
+        "parameters": {
+            quantity.name: compared(quantity.rms_error) for quantity in PlannedQuantity.parameters(knowledge)
+        },
+        "stiffness": errors["stiffness"],
+        "loss_factor": errors["loss_factor"],
+        "visible": {
+            name: {
+                "parameter": qualified_name(get_effect(name), get_effect(name).amount),
+                "unit": get_effect(name).amount.unit,
+                "planned": amount,
+                "standard": standard_amounts[name],
+            }
+            for name, amount in search.detectable_amounts(planned).items()
+        },
         "rivals": rivals,
-        "warnings": list(plan.notes),
+        "warnings": list(warnings),
     }
 
 
-def _error_comparison(errors: Iterable[float]) -> ErrorComparison:
-    """Entry with three relative errors: before further tests, with the plan, with the standard programme."""
-    before, planned, standard = map(float, errors)
-    return {"before": before, "planned": planned, "standard": standard}
+def planned_run(test: Test, minutes: float) -> PlannedRun:
+    """Make the entry of plan.json for one run of a test, which takes `minutes` with the change of direction."""
+    amplitudes, frequencies = amplitudes_and_frequencies(test)
+    is_loop = isinstance(test, SimulatedLoop)
+    return {
+        "place": str(test.direction),
+        "kind": "loop" if is_loop else "sweep",
+        "stepped": None if isinstance(test, SimulatedLoop) else test.stepped,
+        "amplitudes": list(amplitudes),
+        "unit": test.direction.motion.displacement_unit,
+        "frequencies_Hz": list(frequencies),
+        "cycles": test.cycles if isinstance(test, SimulatedLoop) else None,
+        "minutes": minutes,
+    }

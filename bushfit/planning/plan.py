@@ -1,18 +1,17 @@
 """The plan: tests chosen for an aim, in their order, with explanations and warnings."""
 
 from bisect import bisect_left
-from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
 from bushfit.planning.candidates import unlimited_rig_warning
-from bushfit.planning.contract import Knowledge, Plan, PlanRequest, Programme
+from bushfit.planning.contract import Knowledge, PlanRequest, Test
 from bushfit.planning.criterion import add_runs, order_runs
-from bushfit.planning.search import DETECTABLE, RIVALS_APART, PlanSearch
+from bushfit.planning.document import PlanFile, plan_document
+from bushfit.planning.search import RIVALS_APART, PlanSearch
 from bushfit.planning.targets import UNLIMITED_RUNS, PlannedQuantity, format_half_width
 from bushfit.units import number
 
@@ -22,6 +21,24 @@ _SHARES = {"rivals": (0.125, 0.1875, 0.25, 0.375, 0.5), "targets": tuple((2.0 **
 _NOTABLE_RATIO = 1.005
 #: Longest duration that is computed for a target [min]: months.
 _LONGEST_MINUTES = 60.0 * 2000.0
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """Tests chosen for an aim, with their expected results.
+
+    Args:
+        knowledge: model, covariance and noise before the planned tests.
+        tests: runs of the rig, in the order in which they are made.
+        purposes: sentence on the accuracy lost without a test and all its repeats, by test.
+        document: content of plan.json: durations of the runs and expected results, compared with the standard programme
+            (the paper's tests, repeated as often as the same hours allow).
+    """
+
+    knowledge: Knowledge
+    tests: tuple[Test, ...]
+    purposes: Mapping[Test, str]
+    document: PlanFile
 
 
 def plan(knowledge: Knowledge, request: PlanRequest) -> Plan:
@@ -62,73 +79,15 @@ def plan(knowledge: Knowledge, request: PlanRequest) -> Plan:
             found=f"{number(request.hours, 3)} h",
             expected=f"at least {number(shortest, 2)} h",
         )
-    planned = programme(search, order_runs(counts, places))
-    missed = tuple(explain_miss(search, goal) for goal in search.goals)
-    purposes = {search.tests[test]: describe_purpose(search, test) for test in np.flatnonzero(counts).tolist()}
+    runs = order_runs(counts, places)
+    missed = [explain_miss(search, goal) for goal in search.goals]
+    enough, warnings = explain_free_hours(search, missed), list(plan_warnings(search))
     return Plan(
         knowledge,
-        request,
-        before=programme(search, []),
-        planned=planned,
-        standard=programme(search, search.standard_runs),
-        purposes=purposes,
-        missed=missed,
-        enough=explain_free_hours(search, planned, missed),
-        notes=tuple(plan_warnings(search, planned)),
+        tuple(search.tests[run] for run in runs),
+        {search.tests[test]: describe_purpose(search, test) for test in np.flatnonzero(counts).tolist()},
+        plan_document(search, runs, missed, enough, warnings),
     )
-
-
-def programme(search: PlanSearch, runs: Sequence[int]) -> Programme:
-    """Compute the durations and expected results of a sequence of runs.
-
-    Args:
-        search: search with the candidate tests.
-        runs: test indices in the order of the runs.
-
-    Returns:
-        The tests with their durations, standard errors and detectable amounts.
-    """
-    counts, places = search.count_runs(runs), search.budget.place[list(runs)]
-    model, k = search.models[0], len(search.knowledge.names)
-    information = model.total(counts)
-    covariance = model.error_covariance(information)[0]
-    return Programme(
-        tests=tuple(search.tests[run] for run in runs),
-        minutes=search.budget.minutes[list(runs)] + search.budget.setup_minutes * (np.diff(places, prepend=-1) != 0),
-        errors=np.sqrt(np.diag(covariance))[:k],
-        predictions={quantity.name: quantity.standard_errors(covariance) for quantity in search.predictions},
-        rival_chi_square=search.nearest_rivals(counts) if search.knowledge.rivals else None,
-        half_widths=tuple(goal.half_width(covariance) for goal in search.goals),
-        detectable=detectable_amounts(search, counts),
-    )
-
-
-def detectable_amounts(search: PlanSearch, counts: Array) -> Mapping[str, float]:
-    """Compute the smallest amount of each effect that runs detect in 90 % of the cases by a test at the 5 % level.
-
-    Args:
-        search: search with the candidate tests.
-        counts: number of runs of each test, (tests,).
-
-    Returns:
-        Amount [SI] by name, for effects that the standard programme can detect; infinite if the runs detect none.
-
-    Notes:
-        Noise alone would permit amounts that many repeats average out, such as 0.1 g of moving mass. The accuracy
-        class of a rig limits its errors at each frequency and amplitude, not only their average: an amount is
-        detected only if it changes the response somewhere by more than the class. Of the shapes of an effect, such
-        as the frequencies of a resonance, the median is reported: the most visible one, a resonance at a tested
-        frequency, is a rare case.
-    """
-    model = search.models[0]
-    ratios = model.class_ratios[counts > 0].max(axis=0, initial=0.0)
-    with np.errstate(divide="ignore"):
-        smallest = np.maximum(DETECTABLE / np.sqrt(model.total(counts).noncentralities()[0]), 1.0 / ratios)
-    amounts = defaultdict[str, list[float]](list)
-    for index in np.flatnonzero(search.minimum_noncentrality).tolist():
-        effect = search.effects[index]
-        amounts[effect.name].append(effect.amount.typical * float(smallest[index]))
-    return {name: float(np.median(sizes)) for name, sizes in amounts.items()}
 
 
 def explain_miss(search: PlanSearch, goal: PlannedQuantity) -> str | None:
@@ -199,19 +158,19 @@ def describe_purpose(search: PlanSearch, test: int) -> str:
     return "shows effects that the model lacks"
 
 
-def explain_free_hours(search: PlanSearch, planned: Programme, missed: Sequence[str | None]) -> str | None:
+def explain_free_hours(search: PlanSearch, missed: Sequence[str | None]) -> str | None:
     """Sentence on the reason why the plan leaves hours of the rig free.
 
     Args:
         search: search with the chosen tests.
-        planned: programme of the chosen tests.
         missed: reason why each target is missed; None for a target that is met.
 
     Returns:
         Sentence; None if the hours are used.
     """
     request, budget = search.request, search.budget
-    hours, free = request.hours, request.hours - planned.hours
+    hours, planned = request.hours, budget.spent(search.counts) / 60.0
+    free = hours - planned
     if free <= float(budget.minutes.max() + budget.setup_minutes) / 60.0:
         return None
     reason = "no further run would reduce the error by a quarter per cent"
@@ -220,26 +179,24 @@ def explain_free_hours(search: PlanSearch, planned: Programme, missed: Sequence[
         reason = "these tests distinguish the rivals"
     elif missed and is_shorter:
         reason = "further runs would meet no missed target" if any(missed) else "all targets are met"
-    if not planned.tests:
+    if not search.counts.any():
         needed = "would help" if any(missed) else "is needed"
         return f"no test {needed}: {reason}, and all {number(hours, 3)} h remain free"
-    return (
-        f"{number(planned.hours, 2)} of {number(hours, 3)} h are enough: {reason}, and {number(free, 2)} h remain free"
-    )
+    return f"{number(planned, 2)} of {number(hours, 3)} h are enough: {reason}, and {number(free, 2)} h remain free"
 
 
-def plan_warnings(search: PlanSearch, planned: Programme) -> Iterator[str]:
+def plan_warnings(search: PlanSearch) -> Iterator[str]:
     """Generate the warnings of a plan, the most important first.
 
     Args:
         search: search with the chosen tests.
-        planned: programme of the chosen tests.
 
     Returns:
         Iterator over sentences.
     """
-    knowledge, request = search.knowledge, search.request
-    if sentence := unlimited_rig_warning(knowledge, request.rig, planned.tests):
+    knowledge, request, counts = search.knowledge, search.request, search.counts
+    tests = [search.tests[test] for test in np.flatnonzero(counts)]
+    if sentence := unlimited_rig_warning(knowledge, request.rig, tests):
         yield sentence
     stiffnesses = (quantity for quantity in search.predictions if quantity.name.startswith("stiffness"))
     model_error = max((float(quantity.model_error.max()) for quantity in stiffnesses), default=0.0)
@@ -254,15 +211,15 @@ def plan_warnings(search: PlanSearch, planned: Programme) -> Iterator[str]:
             f"{' and '.join(knowledge.bounded)} ended at a bound: the planned errors of the other parameters "
             "include half of the additional error of a fit without the bound"
         )
-    if search.goals and not search.determines_scatter(search.counts):
+    if search.goals and not search.determines_scatter(counts):
         yield "too few repeats determine the scatter of sweeps: intervals may become 1.5 times as wide as planned"
-    if effects := search.less_visible_effects(search.counts):
+    if effects := search.less_visible_effects(counts):
         yield f"the standard programme shows these effects better: {', '.join(effects)}"
     for pair in np.argwhere(np.triu(~search.separable_rivals, 1)).tolist():
         names = (knowledge.rivals[rival].model.effects[-1] for rival in pair)
         yield f"no test of this rig would distinguish {' from '.join(names)}: they are left out"
-    if planned.rival_chi_square is not None and planned.rival_chi_square < RIVALS_APART:
+    if knowledge.rivals and (chi_square := search.nearest_rivals(counts)) < RIVALS_APART:
         yield (
-            f"the expected chi-square between the nearest rivals is {number(planned.rival_chi_square, 2)}, less "
+            f"the expected chi-square between the nearest rivals is {number(chi_square, 2)}, less "
             f"than the {number(RIVALS_APART, 3)} that distinguishes them in nine of ten cases"
         )

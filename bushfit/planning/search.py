@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -93,7 +93,7 @@ class PlanSearch:
             models.append(grid.information(rival, np.delete(residuals, index, axis=0) - residuals[index]))
         predictions = [quantity for grid in request.grids for quantity in PlannedQuantity.predictions(knowledge, grid)]
         named = {quantity.name: quantity for quantity in (*PlannedQuantity.parameters(knowledge), *predictions)}
-        goals = [replace(named[str(target)], target=target.half_width) for target in request.targets]
+        goals = [replace(named[name], target=half_width) for name, half_width in request.targets.items()]
         return cls(knowledge, request, tests, effects, models, predictions, goals, Budget.from_tests(tests, request))
 
     def within(self, hours: float) -> PlanSearch:
@@ -167,6 +167,11 @@ class PlanSearch:
         """Number of runs of each test, (tests,), in a sequence of test indices."""
         return np.bincount(np.array(runs, dtype=int), minlength=len(self.tests))
 
+    def minutes_of(self, runs: Sequence[int]) -> list[float]:
+        """Duration of each run in a sequence of test indices, with the change of direction before it [min]."""
+        changes = np.diff(self.budget.place[list(runs)], prepend=-1) != 0
+        return (self.budget.minutes[list(runs)] + self.budget.setup_minutes * changes).tolist()
+
     def reaches_aim(self, *, with_checks: bool = False) -> bool:
         """Check that the chosen tests separate the rival models with a margin of two, or meet the reachable targets.
 
@@ -212,6 +217,33 @@ class PlanSearch:
         reached = self.models[0].total(counts).noncentralities()[0]
         short = np.sqrt(reached) < 0.995 * np.sqrt(self.minimum_noncentrality)  # numerical accuracy
         return list(dict.fromkeys(self.effects[index].name for index in np.flatnonzero(short)))
+
+    def detectable_amounts(self, counts: Array) -> dict[str, float | None]:
+        """Compute the smallest amount of each effect that runs detect in 90 % of the cases by a test at the 5 % level.
+
+        Args:
+            counts: number of runs of each test, (tests,).
+
+        Returns:
+            Amount [SI] by name, for effects that the standard programme can detect; None if the runs detect none.
+
+        Notes:
+            Noise alone would permit amounts that many repeats average out, such as 0.1 g of moving mass. The accuracy
+            class of a rig limits its errors at each frequency and amplitude, not only their average: an amount is
+            detected only if it changes the response somewhere by more than the class. Of the shapes of an effect, such
+            as the frequencies of a resonance, the median is reported: the most visible one, a resonance at a tested
+            frequency, is a rare case.
+        """
+        model = self.models[0]
+        ratios = model.class_ratios[counts > 0].max(axis=0, initial=0.0)
+        with np.errstate(divide="ignore"):
+            smallest = np.maximum(DETECTABLE / np.sqrt(model.total(counts).noncentralities()[0]), 1.0 / ratios)
+        amounts = defaultdict[str, list[float]](list)
+        for index in np.flatnonzero(self.minimum_noncentrality).tolist():
+            effect = self.effects[index]
+            amounts[effect.name].append(effect.amount.typical * float(smallest[index]))
+        medians = {name: float(np.median(sizes)) for name, sizes in amounts.items()}
+        return {name: median if np.isfinite(median) else None for name, median in medians.items()}
 
     def with_repeats(self, counts: Array) -> Array:
         """Repeat one test in each direction with more than two tests, so that repeats show drift and noise.

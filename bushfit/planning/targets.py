@@ -95,13 +95,14 @@ class PlannedQuantity:
         """Relative variance due to the parameters at each point, (n,), from their covariance, (k, k)."""
         return np.square(self.scale) * np.einsum("nk,kl,nl->n", self.rows, error_covariance, self.rows)
 
-    def standard_errors(self, error_covariance: Array) -> Array:
-        """Standard error at each point in the unit of `value`, (n,), from the parameters' covariance, (k, k)."""
-        return self.value * np.sqrt(self.variances(error_covariance) + self.model_error**2)
+    def rms_error(self, error_covariance: Array) -> float:
+        """Root mean square of the standard errors, in the unit of `value`, from the parameters' covariance, (k, k)."""
+        variances = self.variances(error_covariance) + self.model_error**2
+        return float(np.sqrt(np.mean(np.square(self.value) * variances)))
 
     def half_widths(self, error_covariance: Array) -> Array:
         """Relative half width of the 95 % interval at each point, (n,), from the parameters' covariance, (k, k)."""
-        return self.undecided + Z95 * self.standard_errors(error_covariance) / self.value
+        return self.undecided + Z95 * np.sqrt(self.variances(error_covariance) + self.model_error**2)
 
     def half_width(self, error_covariance: Array) -> float:
         """Relative half width of the widest 95 % interval, from the parameters' covariance, (k, k)."""

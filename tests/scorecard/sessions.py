@@ -80,11 +80,11 @@ def planned_session(campaign: Campaign, hours: float) -> tuple[Test, ...]:
     fastest = max(float(sweep.frequency.max()) for sweep in campaign.sweeps)
     rig = replace(campaign.rig, max_frequency=FASTER * fastest)
     try:
-        planned = plan(replace(campaign, rig=rig), aim="rivals", hours=hours).plan.planned
+        planned = plan(replace(campaign, rig=rig), aim="rivals", hours=hours)
     except ModelError:  # rivals of which the fit of either is no model: no test is planned for them
         return ()
-    apart = planned.rival_chi_square
-    return planned.tests if apart is not None and apart >= RIVALS_APART else ()
+    rivals = planned.document["rivals"]
+    return planned.plan.tests if rivals and rivals["planned"] >= RIVALS_APART else ()
 
 
 def with_session(campaign: Campaign, hidden: Simulated, tests: tuple[Test, ...]) -> Campaign:
