@@ -131,8 +131,7 @@ def _print_plan(output: Output, outcome: PlanOutput) -> None:
         for place, row in document["stiffness"].items()
     )
     runs = f"{len(document['tests'])} runs in {hours} h"
-    result = outcome.plan.knowledge.result
-    misses = result is not None and result.model_error is not None
+    misses = outcome.plan.knowledge.result.model_error is not None
     condition, included = (", if the model were right", ", model error included") if misses else ("", "")
     if rivals := document["rivals"]:
         chi_square, standard = (number(rivals[key], 3) for key in ("planned", "standard"))

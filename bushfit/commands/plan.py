@@ -100,7 +100,7 @@ def plan(
                 expected=", ".join(knowledge.names),
                 hint=did_you_mean(name, knowledge.names),
             )
-    specimens = knowledge.specimens
+    specimens = knowledge.result.specimens
     default = default_places(knowledge.model.bushing, () if knowledge.model.bushing else specimens)
     places = tuple(place for name in test_directions for place in get_places(name, specimens)) or tuple(default)
     settings, sweeps = grid_settings(requested_settings(grid), campaign), campaign.sweeps if campaign else ()

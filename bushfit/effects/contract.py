@@ -101,11 +101,7 @@ class Parameter:
     scale: Literal["period", "frequency", "displacement", "strain", "force", "order", "session"] | None = None
 
     def value_at_share(self, share: float) -> float:
-        """Value whose distance from the neutral value (0 if None) is a share of the typical distance.
-
-        >>> Parameter("c3", "1", (0.0, 1e5), 0.0, 20.0, "cubic stress coefficient over mu").value_at_share(0.5)
-        10.0
-        """
+        """Value whose distance from the neutral value (0 if None) is a share of the typical distance."""
         return (self.neutral or 0.0) + share * self.typical
 
 

@@ -7,8 +7,10 @@ deviations at the nodes are interpolated in the same way, because errors of neig
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Annotated
 
 import numpy as np
+from pydantic import Field
 
 from bushfit import geometry
 from bushfit.effects.contract import (
@@ -37,6 +39,8 @@ _FADE_LENGTH = 0.5
 _DEVIATIONS = 2.0
 
 Row = tuple[Number, ...]
+Positive = Annotated[Number, Field(gt=0)]
+Deviations = tuple[Annotated[Number, Field(ge=0)], ...]
 
 
 @dataclass(frozen=True)
@@ -53,25 +57,21 @@ class Patch:
     """
 
     directions: tuple[Name, ...]
-    frequency_Hz: Row  # noqa: N815
-    strain: Row
+    frequency_Hz: tuple[Positive, ...]  # noqa: N815
+    strain: tuple[Positive, ...]
     in_phase: Row
     in_quadrature: Row
-    in_phase_error: Row
-    in_quadrature_error: Row
+    in_phase_error: Deviations
+    in_quadrature_error: Deviations
     temperature_K: Row = ()  # noqa: N815
 
     def __post_init__(self) -> None:
-        """Raise a ValueError for lists of unequal length, a node without motion, or a negative deviation."""
+        """Raise a ValueError for empty lists, or lists of unequal length."""
         lists = (self.frequency_Hz, self.strain, self.in_phase, self.in_quadrature, self.temperature_K or self.strain)
         sizes = {len(values) for values in (*lists, self.in_phase_error, self.in_quadrature_error)}
         if len(sizes) > 1 or sizes == {0}:
             found = f"lists of {' and '.join(map(str, sorted(sizes)))} values"
             raise ValueError(ModelError("no values at nodes", found=found, expected="one value a node, and a node"))
-        if min(*self.frequency_Hz, *self.strain) <= 0.0:
-            raise ValueError(ModelError("a node without motion", expected="frequency_Hz and strain above 0"))
-        if min(*self.in_phase_error, *self.in_quadrature_error) < 0.0:
-            raise ValueError(ModelError("a negative standard deviation", expected="errors of 0 or more"))
 
     @cached_property
     def nodes(self) -> Array:
@@ -92,16 +92,9 @@ class Unnamed:
             deviation `far_deviation`.
     """
 
-    size: Number
-    lengths: tuple[Number, Number]
-    patches: tuple[Patch, ...]
-
-    def __post_init__(self) -> None:
-        """Raise a ValueError for a correction without patches, or without a size or length above 0."""
-        if not self.patches:
-            raise ValueError(ModelError("a correction without values", expected="a patch for each direction"))
-        if min(self.size, *self.lengths) <= 0.0:
-            raise ValueError(ModelError("a correction of no size or length", expected="size and lengths above 0"))
+    size: Positive
+    lengths: tuple[Positive, Positive]
+    patches: Annotated[tuple[Patch, ...], Field(min_length=1)]
 
     @cached_property
     def _at_nodes(self) -> tuple[Array, Array]:

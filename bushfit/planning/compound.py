@@ -7,6 +7,7 @@ from bushfit.effects import BASE
 from bushfit.geometry import Bushing
 from bushfit.model.covariance import Z95
 from bushfit.model.model import FIVE, Model
+from bushfit.model.result import Result
 from bushfit.planning.contract import Knowledge
 from bushfit.units import number
 
@@ -120,4 +121,4 @@ def guess_parameters(bushing: Bushing, compound: Compound) -> Knowledge:
         f"in {compound.rubber} rubber: Gent's relation for the modulus, the paper's compound for the rest; 95 % of "
         f"rubbers are assumed within factors of {', '.join(f'{number(factor, 2)} ({name})' for name, factor in widths)}"
     )
-    return Knowledge(Model(bushing, BASE, values), FIVE, covariance, source)
+    return Knowledge(Result(Model(bushing, BASE, values)), FIVE, covariance, source)

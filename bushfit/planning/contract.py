@@ -17,7 +17,7 @@ from bushfit.campaign.schema import RigSettings
 from bushfit.campaign.simulated import SimulatedLoop, SimulatedSweep
 from bushfit.effects.contract import Array
 from bushfit.fitting.rig_class import ASSUMED
-from bushfit.geometry import Place, Specimen
+from bushfit.geometry import Place
 from bushfit.model.model import Model
 from bushfit.model.result import Result
 
@@ -72,7 +72,8 @@ class Knowledge:
     """Model, parameter covariance and rig noise before the planned tests: the prior of a plan.
 
     Args:
-        model: model with its likeliest parameter values.
+        result: model with its likeliest parameter values, with the range of the tests so far and the warnings of their
+            fit, if there are tests; and specimens of the compound that can be tested in place of the bushing.
         names: names of the k parameters that the tests shall determine.
         covariance: covariance of the relative changes of the k parameters and of the b bounded ones, (k + b, k + b).
         source: origin of the knowledge, as a phrase.
@@ -80,27 +81,29 @@ class Knowledge:
         rivals: the same for each rival model, this model first; empty if there is no doubt. Rival models explain the
             tests so far equally well, each by another effect.
         probability: probability of this model among its rivals.
-        strain: largest equivalent strain amplitude measured so far [1]; None if there are no tests.
-        specimens: specimens of the compound that can be tested in place of the bushing.
         tests: runs of the campaign so far.
         bounded: names of the b parameters that the fit has at a bound; their changes are in units of typical values.
-        warnings: warnings of the fit.
-        result: result of the fit; None for an estimate without tests.
     """
 
-    model: Model
+    result: Result
     names: tuple[str, ...]
     covariance: Array
     source: str
     noise: Noise = field(default_factory=Noise)
     rivals: tuple[Knowledge, ...] = ()
     probability: float = 1.0
-    strain: float | None = None
-    specimens: tuple[Specimen, ...] = ()
     tests: tuple[Test, ...] = ()
     bounded: tuple[str, ...] = ()
-    warnings: tuple[str, ...] = ()
-    result: Result | None = None
+
+    @property
+    def model(self) -> Model:
+        """Model with its likeliest parameter values."""
+        return self.result.model
+
+    @property
+    def strain(self) -> float | None:
+        """Largest equivalent strain amplitude measured so far [1]; None if there are no tests."""
+        return self.result.measured.strain[1] if self.result.measured else None
 
     @property
     def precision(self) -> Array:

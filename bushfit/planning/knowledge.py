@@ -44,18 +44,7 @@ def from_result(result: Result, noise: Noise | None = None, source: str = "") ->
     if fitted.names:
         size = Coordinates.of_parameters(model, names).slopes(model.values) * relative_sizes(model, names)
         covariance, origin = fitted.restricted(names).matrix / np.outer(size, size), "a fitted model"
-    strain = result.measured.strain[1] if result.measured else None
-    return Knowledge(
-        model,
-        names,
-        covariance,
-        source or origin,
-        noise or Noise(),
-        strain=strain,
-        specimens=result.specimens,
-        warnings=tuple(result.warnings),
-        result=result,
-    )
+    return Knowledge(result, names, covariance, source or origin, noise or Noise())
 
 
 def from_campaign(data: PreparedCampaign, rivals: Sequence[str] | None = None) -> Knowledge:
@@ -88,8 +77,7 @@ def from_campaign(data: PreparedCampaign, rivals: Sequence[str] | None = None) -
 
     def knowledge(evidence: Evidence) -> Knowledge:
         result = replace(result_of(evidence, data.bounds, ()), specimens=data.campaign.specimens)
-        strain = max(float(np.max(tests.amplitude)) * model.unit_strain(tests.direction) for tests in data_sets)
-        plain = replace(from_result(result, noise, source), strain=strain, tests=tuple(_campaign_runs(data)))
+        plain = replace(from_result(result, noise, source), tests=tuple(_campaign_runs(data)))
         bounded = tuple(name for name in evidence.solution.at_bound if name not in plain.names)
         return _with_bounded_parameters(plain, bounded, data_sets) if bounded else plain
 

@@ -205,7 +205,7 @@ def plan_warnings(search: PlanSearch) -> Iterator[str]:
             f"the errors of the stiffness include the model error, up to {number(100.0 * model_error, 2)} %, "
             "which no test reduces; bushfit diagnose looks for the missing effect"
         )
-    yield from knowledge.warnings
+    yield from knowledge.result.warnings
     if knowledge.bounded:
         yield (
             f"{' and '.join(knowledge.bounded)} ended at a bound: the planned errors of the other parameters "

@@ -203,7 +203,7 @@ class PlanSearch:
             Sentence; None if the direction is tested or the target is a parameter.
         """
         place, knowledge = goal.place, self.knowledge
-        measured = knowledge.result.measured if knowledge.result else None
+        measured = knowledge.result.measured
         planned = (self.tests[test] for test in np.flatnonzero(counts))
         tested = [*(measured.directions if measured else ())]
         tested += [str(test.direction) for test in (*knowledge.tests, *planned)]

@@ -10,7 +10,6 @@ from bushfit.effects.contract import Array
 from bushfit.fitting.preparation import planned_sweep
 from bushfit.geometry import Place
 from bushfit.model.covariance import Z95, Covariance
-from bushfit.model.result import Result
 from bushfit.planning.contract import Knowledge, PredictionGrid
 from bushfit.planning.information import relative_slopes
 from bushfit.prediction.stiffness import Prediction, predict
@@ -70,7 +69,7 @@ class PlannedQuantity:
         Returns:
             Planned stiffness, then planned loss factor.
         """
-        exact = replace(knowledge.result or Result(knowledge.model), covariance=Covariance())
+        exact = replace(knowledge.result, covariance=Covariance())
         prediction = predict(exact, grid.place, grid.frequencies, grid.amplitudes)
         points = grid.place, prediction.frequency, prediction.amplitude
         sweep = planned_sweep(knowledge.model, *points, (1.0, 1.0), (0.0, 0.0))

@@ -18,6 +18,7 @@ from bushfit.fitting.problem import FitProblem
 from bushfit.geometry import Bushing, Direction, Specimen
 from bushfit.model.covariance import Z95
 from bushfit.model.model import FIVE, Model
+from bushfit.model.result import Result
 from bushfit.planning.campaign import campaign_toml, simulation_settings
 from bushfit.planning.candidates import candidates
 from bushfit.planning.compound import gent_modulus, guess_parameters
@@ -135,7 +136,9 @@ def test_rivals_are_as_far_apart_as_the_best_refit_of_either_leaves_them(known):
     one = known.model.with_effect("inertia", {"inertia.mass": 0.03})
     few = [_noise_free(known.model, one, test) for test in SWEEPS[:3]]
     other = solve(FitProblem(known.model.with_effect("delay"), few, (*known.names, "delay.tau"))).model
-    rivals = [replace(known, model=m, names=tuple(m.parameters), covariance=1e6 * np.eye(6)) for m in (one, other)]
+    rivals = [
+        replace(known, result=Result(m), names=tuple(m.parameters), covariance=1e6 * np.eye(6)) for m in (one, other)
+    ]
     grid = CandidateGrid.from_tests(replace(known, noise=replace(NOISE, level=(0.0, 0.0))), SWEEPS)
     left = [residual(rival.model, grid.data_sets) for rival in rivals]
     views = [
@@ -249,7 +252,7 @@ def test_the_campaign_of_a_plan_is_what_simulate_reads(known, tmp_path):
         SimulatedSweep(RADIAL, (1e-4,), (5.0, 40.0, 155.0)),
     )
     model = known.model.with_effect("inertia", {"inertia.mass": 0.07}).with_effect("second_springpot")
-    known = replace(known, model=model, noise=Noise(rows_as_one=9.0, level=(0.003, 0.002)))
+    known = replace(known, result=Result(model), noise=Noise(rows_as_one=9.0, level=(0.003, 0.002)))
     file = tmp_path / "planned.toml"
     file.write_text(campaign_toml(known, tests), encoding="utf-8")
     campaign = load_campaign(file)
