@@ -171,13 +171,15 @@ def _print_plan(output: Output, outcome: PlanOutput) -> None:
 
 def _print_tests(output: Output, outcome: PlanOutput) -> None:
     """Print a table of the planned tests with the number of runs of each."""
+    import numpy as np
+
     from bushfit.campaign.simulated import SimulatedLoop
-    from bushfit.planning.contract import amplitudes_and_frequencies
+    from bushfit.planning.contract import operating_points
 
     tests, rows = outcome.plan.tests, []
     for test, runs in Counter(tests).items():
         unit, factor = test.direction.display.displacement
-        sizes, rates = amplitudes_and_frequencies(test)
+        rates, sizes = (np.unique(axis).tolist() for axis in operating_points(test))
         kind = f"loop, {test.cycles} cycles" if isinstance(test, SimulatedLoop) else f"sweep over {test.stepped}"
         motion = f"{_listed(sizes, factor)} {unit}", _listed(rates, 1.0)
         rows.append((str(test.direction), kind, *motion, str(runs)))

@@ -47,6 +47,7 @@ class History:
     solved: dict[str, Any] = field(default_factory=dict)
     accuracy: float = 1e-10
     second_order: bool = False
+    _by_factor: dict[float, History] = field(default_factory=dict, init=False)
 
     @classmethod
     def steady(cls, value: Array, frequency: float, cycles: int = 1) -> History:
@@ -190,11 +191,6 @@ class History:
         if factor not in self._by_factor:
             self._by_factor[factor] = self.with_value(self.value * factor)
         return self._by_factor[factor]
-
-    @cached_property
-    def _by_factor(self) -> dict[float, History]:
-        """Cache of the histories of this motion multiplied by a factor, by the factor."""
-        return {}
 
 
 @dataclass(frozen=True, eq=False)

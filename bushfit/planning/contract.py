@@ -36,13 +36,6 @@ def operating_points(test: Test) -> tuple[Array, Array]:
     return frequency.ravel(), amplitude.ravel()
 
 
-def amplitudes_and_frequencies(test: Test) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Distinct zero-to-peak amplitudes [m, rad or strain] and frequencies [Hz] of a test, in that order."""
-    if isinstance(test, SimulatedLoop):
-        return (test.amplitude,), (test.frequency,)
-    return test.amplitudes, test.frequencies
-
-
 @dataclass(frozen=True)
 class Noise:
     """Standard deviations of the rig's measurement errors.

@@ -3,12 +3,13 @@
 from collections.abc import Callable, Sequence
 from typing import Literal
 
+import numpy as np
 from typing_extensions import TypedDict
 
 from bushfit.campaign.simulated import SimulatedLoop
 from bushfit.effects import get_effect, qualified_name
 from bushfit.effects.contract import Array
-from bushfit.planning.contract import Aim, Test, amplitudes_and_frequencies
+from bushfit.planning.contract import Aim, Test, operating_points
 from bushfit.planning.search import RIVALS_APART, PlanSearch
 from bushfit.planning.targets import PlannedQuantity
 
@@ -208,16 +209,23 @@ def plan_document(
 
 
 def planned_run(test: Test, minutes: float) -> PlannedRun:
-    """Make the entry of plan.json for one run of a test, which takes `minutes` with the change of direction."""
-    amplitudes, frequencies = amplitudes_and_frequencies(test)
-    is_loop = isinstance(test, SimulatedLoop)
+    """Make the entry of plan.json for one run of a test.
+
+    Args:
+        test: loop or sweep.
+        minutes: duration with the change of direction before it [min].
+
+    Returns:
+        Keys and values of the entry, in SI units.
+    """
+    frequencies, amplitudes = (np.unique(axis).tolist() for axis in operating_points(test))
     return {
         "place": str(test.direction),
-        "kind": "loop" if is_loop else "sweep",
+        "kind": "loop" if isinstance(test, SimulatedLoop) else "sweep",
         "stepped": None if isinstance(test, SimulatedLoop) else test.stepped,
-        "amplitudes": list(amplitudes),
+        "amplitudes": amplitudes,
         "unit": test.direction.motion.displacement_unit,
-        "frequencies_Hz": list(frequencies),
+        "frequencies_Hz": frequencies,
         "cycles": test.cycles if isinstance(test, SimulatedLoop) else None,
         "minutes": minutes,
     }
