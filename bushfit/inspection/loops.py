@@ -1,40 +1,21 @@
-"""Contents of a hysteresis loop or a raw stepped-sine history: cycles or steps, noise, and faults of its channels."""
+"""Contents of a hysteresis loop, several loops in one record, or a raw stepped-sine history: sizes, noise, oddities."""
 
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from bushfit.effects.mistakes import MISTAKES
 from bushfit.fitting.loop_cycles import waveform
 from bushfit.fitting.prepared_loop import TOLD_MEAN, PreparedLoop, prepare_loop, recorded_means
-from bushfit.inspection.labels import wrong_labels
-from bushfit.inspection.plausible import implausible_sizes
+from bushfit.inspection.channels import EVEN_CLOCK, describe_sampling, odd_recording
 from bushfit.inspection.record import Findings, format_frequencies
-from bushfit.reading.measurement import Floats, Loop
+from bushfit.reading.measurement import Loop
 from bushfit.reading.names import Labels
-from bushfit.reduction.cycles import lone_outliers, stretches
 from bushfit.reduction.harmonics import cycle_harmonics, resolved_order, series
 from bushfit.reduction.steps import reduce
 from bushfit.reduction.turning_points import noise_threshold
 from bushfit.units import display_unit, format_aligned, number
 
-#: Minimum duration of a gap in units of the median time step; chosen: jitter of the clock is shorter.
-_GAP_STEPS = 5.0
-#: Minimum duration of a gap in units of the 99 % quantile of the time steps; chosen: random rows leave no such gap.
-_GAP_WIDEST_STEPS = 3.0
-#: Maximum range of the time steps of an even clock, relative to the median step; chosen: files round times.
-_EVEN_CLOCK = 0.02
-#: Minimum number of equal rows of a stuck recorder; chosen: a converter repeats fewer at the ends of the motion.
-_STUCK_ROWS = 5
-#: Minimum motion during the equal rows, relative to the range of the motion; chosen: a resting motion changes by less.
-_STUCK_MOTION = 0.02
-#: Minimum number of rows with exactly the extreme value of a clipped channel; chosen: noise makes fewer equal.
-_FLAT_ROWS = 8
-#: Minimum ratio of these rows to rows just below the extreme; chosen: the ratio is smaller without clipping.
-_FLAT_RATIO = 5.0
-#: Distance from the extreme, relative to the range, of values just below it; at least one step of the converter.
-_JUST_BELOW = 2e-3
 #: Minimum change between cycles in standard errors; chosen: noise does not reach it in any of many tests.
 _REAL_CHANGE = 6.0
 #: Minimum change between cycles, relative to half the range of the force; chosen: less does not matter to a fit.
@@ -56,128 +37,6 @@ _FEWEST_RIPPLE_ROWS = 200
 _LONGEST_CYCLE = 3000.0
 
 
-def sampling_rate(history: Loop) -> float:
-    """Return the usual sampling rate of a record [Hz]."""
-    return 1.0 / float(np.median(np.diff(history.time)))
-
-
-def describe_sampling(history: Loop) -> str:
-    """Describe the time steps of a record.
-
-    Returns:
-        A clause such as "even, every 0.01 s".
-    """
-    if not history.has_recorded_time:
-        return "no time in the file"
-    steps = np.diff(history.time)
-    usual = float(np.median(steps))
-    if np.ptp(steps) < _EVEN_CLOCK * usual:
-        return f"even, every {usual:.4g} s"
-    return f"uneven, every {steps.min():.3g} to {steps.max():.3g} s, mostly {usual:.3g} s"
-
-
-class RecordedChannel(NamedTuple):
-    """Recorded displacement or force: name, display unit, factor from SI to that unit, and values [SI], (n,)."""
-
-    name: str
-    unit: str
-    factor: float
-    values: Floats
-
-    def format_row(self, row: int) -> str:
-        """Format the value of a row (index from 0) in the display unit, without the unit."""
-        return number(self.factor * self.values[row], 4)
-
-
-def odd_channels(history: Loop) -> list[str]:
-    """Find faults in the channels of a record: gaps, a stuck recorder, clipped values, outliers.
-
-    Args:
-        history: record of a loop or a raw history [SI].
-
-    Returns:
-        One sentence for each fault.
-    """
-    names, units = history.direction.motion.words, history.direction.display
-    motion = RecordedChannel(names[0], *units.displacement, history.displacement)
-    force = RecordedChannel(names[1], *units.force, history.force)
-    odd = [*gaps(motion, history), *stuck_rows(motion, force)]
-    for channel in (motion, force):
-        odd += cut_off_ends(channel)
-        rows = np.flatnonzero(lone_outliers(history.time, channel.values))
-        listed = ", ".join(
-            f"data row {row + 1} ({channel.format_row(row)} {channel.unit} between {channel.format_row(row - 1)} and "
-            f"{channel.format_row(row + 1)})"
-            for row in rows[:3]
-        )
-        more = f" and {rows.size - 3} more" if rows.size > 3 else ""
-        outlier = "outliers" if rows.size > 1 else "an outlier"
-        odd += [f"the {channel.name} has {outlier} at {listed}{more}"] if rows.size else []
-    return odd
-
-
-def gaps(motion: RecordedChannel, history: Loop) -> list[str]:
-    """Find gaps in the recorded time, or in the motion if no time was recorded.
-
-    Returns:
-        List with one sentence on the gaps; empty without gaps.
-    """
-    steps = np.diff(history.time) if history.has_recorded_time else np.abs(np.diff(motion.values))
-    widest = np.quantile(steps, 0.99)  # gaps left out
-    wide = steps > max(_GAP_STEPS * np.median(steps), _GAP_WIDEST_STEPS * widest)
-    if not history.has_recorded_time:
-        outliers = lone_outliers(history.time, motion.values)
-        wide &= (steps > noise_threshold(motion.values)) & ~(outliers[1:] | outliers[:-1])
-    if not wide.any():
-        return []
-    first, count = int(np.argmax(wide)), int(wide.sum())
-    channel, size = "time", f"{steps[first]:.3g} s without a row, else mostly {np.median(steps):.3g} s"
-    if not history.has_recorded_time:
-        ends = f"{motion.format_row(first)} to {motion.format_row(first + 1)} {motion.unit}"
-        channel, size = "the motion", f"the {motion.name} jumps from {ends} at once"
-    return [f"{count} gap{'s' * (count > 1)} in {channel}, the first after data row {first + 1}: {size}"]
-
-
-def stuck_rows(motion: RecordedChannel, force: RecordedChannel) -> list[str]:
-    """Find rows in which the recorder repeats its values although the motion continued.
-
-    Returns:
-        List with one sentence on the longest run of such rows; empty without such rows.
-    """
-    moves = (np.diff(motion.values) != 0.0) | (np.diff(force.values) != 0.0)
-    last, smallest = motion.values.size - 1, _STUCK_MOTION * np.ptp(motion.values)
-    stuck = [
-        rows
-        for rows in stretches(moves, _STUCK_ROWS)  # a record may end stuck: then the motion did not continue
-        if abs(motion.values[min(rows.stop, last)] - motion.values[rows.start]) > smallest
-    ]
-    if not stuck:
-        return []
-    longest = max(stuck, key=lambda rows: rows.stop - rows.start)
-    rows = f"{longest.stop - longest.start} rows from data row {longest.start + 1} on"
-    return [f"{rows} repeat one {motion.name} and {force.name}, although the motion continued"]
-
-
-def cut_off_ends(channel: RecordedChannel) -> list[str]:
-    """Find whether a channel is clipped at its largest or smallest value.
-
-    Returns:
-        One sentence for each clipped end.
-    """
-    values, span, odd = channel.values, float(np.ptp(channel.values)), list[str]()
-    rounding, steps = 1e-9 * span, np.abs(np.diff(values))
-    finest = float(steps[steps > rounding].min(initial=span))
-    width = max(1.01 * finest, _JUST_BELOW * span)  # one step of the converter, rounded
-    for side, row in (("top", int(np.argmax(values))), ("bottom", int(np.argmin(values)))):
-        depth = np.abs(values - values[row])
-        flat_rows = int(np.count_nonzero(depth <= rounding))
-        below = int(np.count_nonzero(depth <= width)) - flat_rows
-        if flat_rows >= max(_FLAT_ROWS, _FLAT_RATIO * below):
-            extreme = f"{channel.format_row(row)} {channel.unit}"
-            odd.append(f"the {channel.name} is cut off at its {side}: {flat_rows} rows are exactly {extreme}")
-    return odd
-
-
 def describe_loop(loop: Loop, labels: Labels) -> Findings:
     """Facts and oddities of a loop.
 
@@ -194,7 +53,7 @@ def describe_loop(loop: Loop, labels: Labels) -> Findings:
     prepared, units, names = prepare_loop(loop), loop.direction.display, loop.direction.motion.words
     (length, to_length), half_force = units.displacement, float(np.ptp(loop.force)) / 2.0
     force, to_force = display_unit(*units.force, half_force)
-    half_motion = np.ptp(loop.displacement) / 2.0
+    half_motion = float(np.ptp(loop.displacement)) / 2.0
     amplitude, mean_motion, mean_force = prepared.amplitude, prepared.coefficients[0].real, float(prepared.force.mean())
     noise = f"{number(100 * prepared.noise / half_force, 2)} % of half the {names[1]} range, per row"
     if prepared.noise > half_force:
@@ -209,19 +68,12 @@ def describe_loop(loop: Loop, labels: Labels) -> Findings:
         f"mean {names[1]}": f"{format_aligned([to_force * half_force, to_force * mean_force], 4)[1]} {force}",
         "noise": noise + prepared.correlation_text * (prepared.noise <= half_force),
     }
-    sizes = (np.array([size]) for size in (prepared.frequency, amplitude, half_force / amplitude))
     if means := recorded_means(prepared):
         at_mean_force = amplitude * abs(mean_force) / half_force
         is_position = len(means) > 1 and abs(mean_motion) > _MOST_SOFTENING * at_mean_force
         facts["preload"] = means[-1 if is_position else 0].text(loop.direction)
-    odd = [
-        *wrong_labels(labels, loop.direction, [amplitude, half_motion], [prepared.frequency], sampling_rate(loop)),
-        *implausible_sizes(loop.direction, *sizes),
-        *odd_channels(loop),
-        *prepared.notes,
-        *changing_cycles(prepared),
-        *ripple(prepared),
-    ]
+    odd = odd_recording(loop, labels, [prepared.frequency], [amplitude, half_motion], [half_force / amplitude])
+    odd += odd_cycles(prepared)
     if prepared.cycles < 1.5 and abs(mean_motion) > 0.9 * half_motion:
         odd.append(
             f"one loading and unloading from {number(to_length * loop.displacement[0], 3)} {length}: a static curve is "
@@ -264,9 +116,9 @@ def describe_history(history: Loop, labels: Labels) -> Findings:
         "sampling": f"{describe_sampling(history)}, {rows:.3g} rows per cycle at least",
         "noise": f"{100 * max(step.gain_error for step in steps):.2g} % of |K| at most, a point",
     }
-    labelled = wrong_labels(labels, history.direction, levels, frequencies, sampling_rate(history))
     notes = history.source.notes if history.source else ()
-    return facts, [*notes, *labelled, *odd_channels(history), *reduction.warnings]
+    odd = odd_recording(history, labels, frequencies, levels, [max(abs(step.stiffness) for step in steps)])
+    return facts, [*notes, *odd, *reduction.warnings]
 
 
 def describe_programme(record: Loop, loops: Sequence[Loop], labels: Labels) -> Findings:
@@ -287,18 +139,18 @@ def describe_programme(record: Loop, loops: Sequence[Loop], labels: Labels) -> F
     unit, factor = record.direction.display.displacement
     amplitudes = [prepared.amplitude for prepared in prepared_loops]
     frequencies = [prepared.frequency for prepared in prepared_loops]
-    cycles = sorted(prepared.cycles for prepared in prepared_loops)
+    cycles = [prepared.cycles for prepared in prepared_loops]
     left_out = 1 - sum(prepared.loop.displacement.size for prepared in prepared_loops) / record.displacement.size
     sizes, rates, ends = (
         list(dict.fromkeys(f"{value:.3g}" for value in values))
-        for values in ([factor * size for size in amplitudes], frequencies, (cycles[0], cycles[-1]))
+        for values in ([factor * size for size in amplitudes], frequencies, (min(cycles), max(cycles)))
     )
     facts = {
         "programme": f"{len(loops)} loops in one record: {', '.join(sizes)} {unit} at {', '.join(rates)} Hz, "
         f"{' to '.join(ends)} cycles used of each; {100 * left_out:.2g} % of the rows left out"
     }
-    labelled = wrong_labels(labels, record.direction, amplitudes, frequencies, sampling_rate(record))
-    odd = [*labelled, *odd_channels(record)]
+    stiffness = [prepared.half_range / prepared.amplitude for prepared in prepared_loops]
+    odd = odd_recording(record, labels, frequencies, amplitudes, stiffness)
     for place, (loop, prepared) in enumerate(zip(loops, prepared_loops, strict=True), start=1):
         rest = loop.part.left_out if loop.part else None
         size, course = number(factor * prepared.amplitude, 4), waveform(prepared.coefficients)
@@ -306,21 +158,25 @@ def describe_programme(record: Loop, loops: Sequence[Loop], labels: Labels) -> F
         noise = f"noise {percent} % of half the range, per row{prepared.correlation_text}"
         words = f"{size} {unit} at {prepared.frequency:.4g} Hz, {course}", noise, rest
         facts[f"loop {place}"] = "; ".join(filter(None, words))
-        notes = (*prepared.notes, *changing_cycles(prepared), *ripple(prepared))
-        odd += [f"loop {place}: {note}" for note in notes if note != rest]
+        odd += [f"loop {place}: {note}" for note in odd_cycles(prepared) if note != rest]
     facts["sampling"] = describe_sampling(record)
     return facts, odd
 
 
-def changing_cycles(prepared: PreparedLoop) -> list[str]:
-    """Find a force amplitude, mean force or mean motion that changes from the first to the last cycles of a loop.
+def odd_cycles(prepared: PreparedLoop) -> list[str]:
+    """List the notes on a loop, changes from cycle to cycle, and a ripple on its motion."""
+    return [*prepared.notes, *changing_cycles(prepared), *ripple(prepared)]
+
+
+def changing_cycles(prepared: PreparedLoop) -> Iterator[str]:
+    """Warn of a force amplitude, mean force or mean motion that changes from the first to the last cycles of a loop.
 
     Loops of one cycle, or with too few rows in a cycle, are not checked.
 
     Returns:
         One sentence for each change beyond chance.
     """
-    loop, count, odd = prepared.loop, int(prepared.cycles + 0.01), list[str]()
+    loop, count = prepared.loop, int(prepared.cycles + 0.01)
     phase = (loop.time - loop.time[0]) * prepared.frequency
     numbers = sorted({*range(min(count, _MOST_END_CYCLES)), *range(max(count - _MOST_END_CYCLES, 0), count)})
     outliers = prepared.outliers["force"].rows
@@ -328,7 +184,7 @@ def changing_cycles(prepared: PreparedLoop) -> list[str]:
     rows = min((part.size for part in parts), default=0)
     order = resolved_order(rows, 7)  # a loop of rubber has next to nothing beyond
     if count < 2 or rows < 4 * order:
-        return []
+        return
     both = np.stack((loop.force, loop.displacement), axis=1)
     fitted = [cycle_harmonics(phase[part], both[part], order) for part in parts]
     # the first cycle from rest has another mean, by the memory of the rubber
@@ -345,7 +201,7 @@ def changing_cycles(prepared: PreparedLoop) -> list[str]:
         last, first = format_aligned([factor * amplitude[-1], factor * amplitude[0]], 4)
         percent = number(100 * change / amplitude[0], 2, "+")
         is_settled = abs(last_change) < max(_REAL_CHANGE * error, smallest / 2.0) and amplitude.size > 2
-        odd.append(
+        yield (
             f"the cycles {'settle' if is_settled else 'are still settling'}: the {force} amplitude goes from "
             f"{first} {force_unit} in the first cycle to {last} in the last ({percent} %)"
         )
@@ -359,27 +215,23 @@ def changing_cycles(prepared: PreparedLoop) -> list[str]:
     ):
         if abs(mean[-1] - mean[0]) > limit:
             last, first = format_aligned([unit.factor * mean[-1], unit.factor * mean[0]], 3, minimum_digits=1)
-            odd.append(f"the {name} drifts: its mean goes from {first} to {last} {unit.name}")
-    return odd
+            yield f"the {name} drifts: its mean goes from {first} to {last} {unit.name}"
 
 
-def ripple(prepared: PreparedLoop) -> list[str]:
-    """Find a fast sine superposed on the motion of a loop: mains hum, servo oscillation or sensor noise.
+def ripple(prepared: PreparedLoop) -> Iterator[str]:
+    """Warn of a fast sine superposed on the motion of a loop: mains hum, servo oscillation or sensor noise.
 
     Returns:
-        One sentence on the ripple; empty without one.
+        One sentence on the ripple; none without one.
 
     Notes:
         The slow harmonics are subtracted from the motion; the ripple is the largest line in the spectrum of the
         remainder, with a Hann window. White noise makes lines up to about five times the median.
     """
     loop, steps = prepared.loop, np.diff(prepared.loop.time)
-    if (
-        not loop.has_recorded_time
-        or steps.size < _FEWEST_RIPPLE_ROWS
-        or np.ptp(steps) > 2.0 * _EVEN_CLOCK * np.median(steps)
-    ):
-        return []
+    is_even = np.ptp(steps) <= 2.0 * EVEN_CLOCK * np.median(steps)
+    if not (loop.has_recorded_time and steps.size >= _FEWEST_RIPPLE_ROWS and is_even):
+        return
     phase = (loop.time - loop.time[0]) * prepared.frequency
     is_triangle = waveform(prepared.coefficients) == "a triangle"
     slow = prepared.coefficients if is_triangle else prepared.coefficients[: _RIPPLE_ORDER + 1]
@@ -390,13 +242,12 @@ def ripple(prepared: PreparedLoop) -> list[str]:
     frequency = np.fft.rfftfreq(rest.size, float(np.mean(steps)))
     lines[frequency < _RIPPLE_ORDER * prepared.frequency] = 0.0
     line = int(np.argmax(lines))
-    if lines[line] <= max(_SMALLEST_RIPPLE * prepared.amplitude, _RIPPLE_LINE * float(np.median(lines))):
-        return []
-    unit, factor = loop.direction.display.displacement
-    is_mains = min(abs(frequency[line] % mains - offset) for mains in (50.0, 60.0) for offset in (0.0, mains)) < 1.0
-    cause = "mains hum" if is_mains else "an oscillating controller, or play at the reversals"
-    return [
-        f"a ripple of about {number(factor * lines[line], 2)} {unit} at {frequency[line]:.3g} Hz "
-        f"({number(100 * lines[line] / prepared.amplitude, 2)} % of the amplitude) is superposed on the motion: "
-        f"{cause}? The slow motion is read as the loop"
-    ]
+    if lines[line] > max(_SMALLEST_RIPPLE * prepared.amplitude, _RIPPLE_LINE * float(np.median(lines))):
+        unit, factor = loop.direction.display.displacement
+        is_mains = min(abs(frequency[line] % mains - offset) for mains in (50.0, 60.0) for offset in (0.0, mains)) < 1.0
+        yield (
+            f"a ripple of about {number(factor * lines[line], 2)} {unit} at {frequency[line]:.3g} Hz "
+            f"({number(100 * lines[line] / prepared.amplitude, 2)} % of the amplitude) is superposed on the motion: "
+            f"{'mains hum' if is_mains else 'an oscillating controller, or play at the reversals'}? The slow motion is "
+            "read as the loop"
+        )

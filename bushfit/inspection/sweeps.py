@@ -58,7 +58,9 @@ def describe_sweep(sweep: Sweep, labels: Labels) -> Findings:
     """
     unit, factor = sweep.direction.display.displacement
     frequencies, levels = np.unique(sweep.frequency), np.unique(sweep.amplitude)
-    noise, points = sweep_noise([sweep]), point_table(sweep)
+    noise, log_stiffness = sweep_noise([sweep]), np.log(sweep.stiffness)
+    keys = {"frequency": sweep.frequency, "amplitude": sweep.amplitude, "repeat": sweep.repeat}
+    points = pd.DataFrame({**keys, "gain": log_stiffness.real, "phase": log_stiffness.imag})
     from_repeats = distance_from_repeats(points)
     level_texts = [f"{factor * level:.4g}" for level in levels[:_MOST_LEVELS]] + ["..."] * (levels.size > _MOST_LEVELS)
     facts = {
@@ -71,7 +73,7 @@ def describe_sweep(sweep: Sweep, labels: Labels) -> Findings:
         *MeasuredSweep(sweep, noise).notes,
         *implausible_sizes(sweep.direction, sweep.frequency, sweep.amplitude, np.abs(sweep.stiffness)),
         *wrong_labels(labels, sweep.direction, levels.tolist(), frequencies.tolist()),
-        *copied_rows(sweep, noise),
+        *copied_rows(sweep, noise, points),
         *odd_levels(sweep, points),
         *missing_frequencies(sweep.direction, points),
         *outlying_points(sweep, noise, points, from_repeats),
@@ -81,43 +83,32 @@ def describe_sweep(sweep: Sweep, labels: Labels) -> Findings:
     return facts, odd
 
 
-def point_table(sweep: Sweep) -> pd.DataFrame:
-    """Table of the points of a sweep: frequency, amplitude and repeat, and gain and phase, the two parts of ln K."""
-    log_stiffness = np.log(sweep.stiffness)
-    keys = {"frequency": sweep.frequency, "amplitude": sweep.amplitude, "repeat": sweep.repeat}
-    return pd.DataFrame({**keys, "gain": log_stiffness.real, "phase": log_stiffness.imag})
-
-
-def copied_rows(sweep: Sweep, noise: SweepNoise) -> Iterator[str]:
+def copied_rows(sweep: Sweep, noise: SweepNoise, points: pd.DataFrame) -> Iterator[str]:
     """Warn of rows with exactly the stiffness of another row at the same frequency and amplitude.
 
     Args:
         sweep: sweep [SI].
         noise: noise of the sweep.
+        points: frequency, amplitude, repeat and ln K (gain and phase) of its points.
 
     Returns:
         One sentence, if noise is unlikely to make this number of rows equal in the digits of the file.
     """
-    # nine digits leave out what the conversion of units leaves in the last ones
-    magnitude, phase = (
-        np.array([float(f"{value:.9g}") for value in values])
-        for values in (np.abs(sweep.stiffness), np.angle(sweep.stiffness))
-    )
-    rows = pd.DataFrame({"frequency": sweep.frequency, "amplitude": sweep.amplitude, "K": magnitude, "phase": phase})
-    copies, repeats = int(rows.duplicated().sum()), rows.groupby(["frequency", "amplitude"], sort=False).size()
+    keys = ["frequency", "amplitude"]
+    rows = points[[*keys, "gain", "phase"]].round({"gain": 9, "phase": 9})  # the conversion of units changes the 16th
+    copied, first, repeats = rows.duplicated(), ~rows.duplicated(keys), rows.groupby(keys, sort=False).size()
     # the value of one in the last digit, if all have as many digits as the longest
+    magnitude = np.abs(sweep.stiffness)
     digits = max(len(f"{value:.8e}".partition("e")[0].replace(".", "").rstrip("0")) for value in magnitude)
-    first = np.flatnonzero(~rows.duplicated(["frequency", "amplitude"]))  # row of each operating point
     finest = 10.0 ** (np.floor(np.log10(magnitude[first])) + 1 - digits)
     scatter = np.array([noise.random[sweep.name, float(value)][0] for value in sweep.held_value[first]])
     same_digit = np.minimum(finest / (scatter * magnitude[first]), 1.0)  # two draws fall on the same last digit
     expected = np.sum(repeats * (repeats - 1) / 2.0 * same_digit * np.maximum(same_digit, _SAME_PHASE_P))
-    if copies and pdtrc(copies - 1, expected) < _CHANCE:
+    if (count := int(copied.sum())) and pdtrc(count - 1, expected) < _CHANCE:
         row = int(np.argmax(rows.duplicated(keep=False)))
-        verb = "s repeat others" if copies > 1 else " repeats another"
         yield (
-            f"{copies} row{verb} digit by digit, the first of them at {sweep.frequency[row]:.4g} Hz (data row "
-            f"{row + 1}): copied instead of measured?"
+            f"{count} row{'s repeat others' if count > 1 else ' repeats another'} digit by digit, the first of them at "
+            f"{sweep.frequency[row]:.4g} Hz (data row {row + 1}): copied instead of measured?"
         )
 
 
@@ -126,7 +117,7 @@ def odd_levels(sweep: Sweep, points: pd.DataFrame) -> Iterator[str]:
 
     Args:
         sweep: sweep [SI].
-        points: table of its points.
+        points: frequency, amplitude, repeat and ln K (gain and phase) of its points.
 
     Returns:
         A sentence if two amplitudes at one frequency are so close that they may be repeats of one level, without
@@ -144,8 +135,7 @@ def odd_levels(sweep: Sweep, points: pd.DataFrame) -> Iterator[str]:
     relative_miss = np.abs(sweep.amplitude_reached / sweep.amplitude - 1.0)
     row = int(np.argmax(relative_miss))
     if relative_miss[row] > MISSED_LEVEL:
-        both = sweep.amplitude_reached[row], sweep.amplitude[row]
-        reached, level = (shown_amplitude(sweep.direction, size) for size in both)
+        reached, level = (shown_amplitude(sweep.direction, x[row]) for x in (sweep.amplitude_reached, sweep.amplitude))
         yield f"{reached} was reached instead of the nominal {level} ({sweep.frequency[row]:.4g} Hz)"
 
 
@@ -154,14 +144,14 @@ def missing_frequencies(place: Place, points: pd.DataFrame) -> Iterator[str]:
 
     Args:
         place: direction or specimen.
-        points: table of the points of a sweep.
+        points: frequency, amplitude, repeat and ln K (gain and phase) of the points of a sweep.
 
     Returns:
         One sentence for each incomplete block.
     """
     measured = pd.crosstab([points["amplitude"], points["repeat"]], points["frequency"]) > 0
     usual = measured.mean() > 0.5
-    for (amplitude, repeat), has in zip(measured.index, measured.to_numpy(), strict=True) if len(measured) > 1 else ():
+    for (amplitude, repeat), has in zip(measured.index, measured.to_numpy(), strict=True):
         absent = [f"{frequency:.4g}" for frequency in measured.columns[usual & ~has]]
         if absent:
             of_repeat = f", repeat {repeat}," if np.unique(points["repeat"]).size > 1 else ""
@@ -173,7 +163,7 @@ def distance_from_repeats(points: pd.DataFrame) -> pd.DataFrame:
     """Gain and phase [rad] of each point minus the median of its repeats; nan for points with fewer than three.
 
     Args:
-        points: table of the points of a sweep.
+        points: frequency, amplitude, repeat and ln K (gain and phase) of the points of a sweep.
     """
     groups, values = points.groupby(["frequency", "amplitude"]), points[["gain", "phase"]]
     distance = values - groups[["gain", "phase"]].transform("median")
@@ -188,7 +178,7 @@ def distance_from_curve(sweep: Sweep, points: pd.DataFrame) -> Array:
 
     Args:
         sweep: sweep [SI].
-        points: table of its points.
+        points: frequency, amplitude, repeat and ln K (gain and phase) of its points.
 
     Returns:
         Difference of the points that deviate far more than the scatter of their run; 0 for the others, (n, 2).
@@ -223,7 +213,7 @@ def outlying_points(sweep: Sweep, noise: SweepNoise, points: pd.DataFrame, from_
     Args:
         sweep: sweep [SI].
         noise: noise of the sweep.
-        points: table of its points.
+        points: frequency, amplitude, repeat and ln K (gain and phase) of its points.
         from_repeats: gain and phase [rad] of each point minus the median of its repeats.
 
     Returns:
@@ -255,7 +245,7 @@ def outlying_blocks(place: Place, points: pd.DataFrame, from_repeats: pd.DataFra
 
     Args:
         place: direction or specimen.
-        points: table of the points of a sweep.
+        points: frequency, amplitude, repeat and ln K (gain and phase) of the points of a sweep.
         from_repeats: gain and phase [rad] of each point minus the median of its repeats.
 
     Returns:

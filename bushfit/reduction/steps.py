@@ -210,11 +210,8 @@ def _creeps(values: Floats, smallest: float) -> bool:
     """
     if values.size < 3:
         return False
-    number = np.arange(values.size) - (values.size - 1) / 2.0
-    squares = float(number @ number)
-    slope = float(number @ values) / squares
-    residual = values - values.mean() - slope * number
-    error = np.sqrt(float(residual @ residual) / (values.size - 2) / squares)
+    (slope, _), covariance = np.polyfit(np.arange(values.size), values, 1, cov=True)
+    error = float(np.sqrt(covariance[0, 0]))
     return bool(abs(slope) * values.size > smallest and abs(slope) > 4.0 * error)  # noise hardly ever goes that far
 
 

@@ -87,17 +87,24 @@ def test_noise_of_a_loop_is_correlated_as_asked_for(clean, correlation):
     assert np.mean(noise[:, 1:] * noise[:, :-1]) == pytest.approx(correlation, abs=0.05)
 
 
-@pytest.mark.parametrize("held", ["amplitude", "frequency"])
-def test_gain_and_phase_errors_are_shared_by_a_run(clean, coupon, held):
-    """A run is one repeat at one of what is held: its points are off by one factor, those of other runs by others."""
-    test, stiffness = (clean if held == "amplitude" else coupon).sweeps[0]
-    own = replace(clean, sweeps=((replace(test, reached=0.0), stiffness),))
-    plan = SimulateSettings(repeats=2000, gain_error=0.01, phase_error=0.02)
-    off = np.log(measure(own, plan).sweeps[0].stiffness.reshape(len(test.levels), 2000, -1) / stiffness[:, None])
-    assert np.ptp(off.real, axis=-1).max() < 1e-12
-    assert np.ptp(off.imag, axis=-1).max() < 1e-12
-    assert np.std(off.real) == pytest.approx(0.01, rel=0.1)
-    assert np.std(off.imag) == pytest.approx(0.02, rel=0.1)
+@pytest.mark.parametrize("shared_by", ["run at an amplitude", "run at a frequency", "level"])
+def test_gain_and_phase_errors_are_shared(clean, coupon, shared_by):
+    """One factor for each run (one repeat at one held value), or for all repeats of a level."""
+    test, stiffness = (coupon if shared_by == "run at a frequency" else clean).sweeps[0]
+    ideal = replace(clean, loops=(), sweeps=((replace(test, reached=0.0), stiffness),))
+    of_level, errors = shared_by == "level", {"gain_error": 0.01, "phase_error": 0.02}
+    plan = SimulateSettings(repeats=4 if of_level else 2000)
+    plan = replace(plan, **({f"level_{name}": error for name, error in errors.items()} if of_level else errors))
+    seeds = range(300 if of_level else 1)
+    measured = [measure(ideal, replace(plan, seed=seed)).sweeps[0].stiffness for seed in seeds]
+    factors = np.log(np.array(measured).reshape(len(seeds), len(test.levels), plan.repeats, -1) / stiffness[:, None])
+    shared = (2, 3) if of_level else 3
+    assert np.abs(np.ptp(factors.real, axis=shared)).max() < 1e-12
+    assert np.abs(np.ptp(factors.imag, axis=shared)).max() < 1e-12
+    assert np.std(factors.real) == pytest.approx(0.01, rel=0.1)
+    assert np.std(factors.imag) == pytest.approx(0.02, rel=0.1)
+    if of_level:
+        assert abs(np.corrcoef(factors[:, :, 0, 0].real.T)[0, 1]) < 0.2
 
 
 def test_an_amplitude_sweep_has_the_stiffness_at_the_amplitudes_reached(coupon):
@@ -121,16 +128,3 @@ def test_a_resonance_test_reduces_to_the_stiffness_at_the_amplitude_reached(pape
         assert np.ptp(np.log(sweep.amplitude)) > np.log(5.0)
         closed = paper_model.stiffness(sweep.direction, sweep.frequency, sweep.amplitude)
         np.testing.assert_allclose(sweep.stiffness, closed, rtol=2e-3)
-
-
-def test_level_errors_are_shared_by_all_repeats_of_a_level(clean):
-    """All repeats of what a sweep holds are off by one factor, those at another amplitude by another."""
-    (test, _), *_ = clean.sweeps
-    own = replace(clean, sweeps=((replace(test, repeats=4), clean.sweeps[0][1]), *clean.sweeps[1:]))
-    ideal = measure(clean, PLAN).sweeps[0].stiffness.reshape(2, 1, 3)
-    plans = [replace(PLAN, level_gain_error=0.01, level_phase_error=0.02, seed=seed) for seed in range(300)]
-    off = np.array([np.log(measure(own, plan).sweeps[0].stiffness.reshape(2, 4, 3) / ideal) for plan in plans])
-    assert np.abs(np.ptp(off.real, axis=(-2, -1))).max() < 1e-12
-    assert np.std(off.real) == pytest.approx(0.01, rel=0.1)
-    assert np.std(off.imag) == pytest.approx(0.02, rel=0.1)
-    assert abs(np.corrcoef(off[:, :, 0, 0].real.T)[0, 1]) < 0.2
