@@ -25,6 +25,11 @@ from bushfit.validation import validate_tables
 
 #: Keys of [[specimens]] for the sizes of a block in shear.
 BLOCK_KEYS = ("area", "thickness", "elements")
+#: Campaign keys for the column of the loss, which a symbol such as D or psi does not distinguish.
+_LOSS_COLUMN = (
+    'columns = { loss_factor = "..." } or columns = { damping_ratio = "..." }, half of the loss factor, or '
+    'columns = { damping_coefficient = "..." }'
+)
 #: Headers of a bar in tension: E', |E*|, "storage modulus E'", "tensile strain".
 _TENSILE = re.compile(r"(?<![^\W_])E(?![^\W_])|young|tensile|tension|traction|zug", re.IGNORECASE)
 
@@ -85,7 +90,7 @@ def recognize_table(file: Path, test_options: Mapping[str, Any]) -> tuple[Table,
         kind=NoTestError,
         found=", ".join(best.headers) + f" (understood: {understood})" if understood else None,
         expected="time, displacement and force; or frequency, amplitude, and stiffness with loss factor or phase",
-        hint=advice or f"correct the header, or name the column: {column}",
+        hint=advice or f"correct the header, or name the column: {_LOSS_COLUMN if lacking == 'loss_factor' else column}",
     )
 
 

@@ -80,6 +80,7 @@ def sweeps(folder: Path, *headers: str, cells: str = "0.1,{},0.1") -> list[str]:
         ("x,amplitude [mm],stiffness [N/mm],loss factor [-]", "--at-frequency", "force="),
         ("frequency [Hz],amplitude,stiffness [N/mm],loss factor [-]", '--unit "amplitude=', "--amplitude"),
         ("frequency [Hz],amplitude [mm],stiffness [N/mm],K* [N/mm]", "could be the stiffness", "force"),
+        ("frequency [Hz],amplitude [mm],stiffness [N/mm],D [-]", '--column "damping_ratio=', "force"),
     ],
 )
 def test_a_hint_leads_to_what_a_sweep_lacks(typed, tmp_path, header, said, unsaid):
