@@ -90,7 +90,8 @@ def recognize_table(file: Path, test_options: Mapping[str, Any]) -> tuple[Table,
         kind=NoTestError,
         found=", ".join(best.headers) + f" (understood: {understood})" if understood else None,
         expected="time, displacement and force; or frequency, amplitude, and stiffness with loss factor or phase",
-        hint=advice or f"correct the header, or name the column: {_LOSS_COLUMN if lacking == 'loss_factor' else column}",
+        hint=advice
+        or f"correct the header, or name the column: {_LOSS_COLUMN if lacking == 'loss_factor' else column}",
     )
 
 
