@@ -9,7 +9,7 @@ from bushfit.errors import MeasurementError
 from bushfit.geometry import TRANSLATION, Motion
 from bushfit.reading.blocks import combined, exchange_rows
 from bushfit.reading.classification import classify
-from bushfit.reading.headers import Vocabulary
+from bushfit.reading.headers import ALL_COLUMNS, Vocabulary
 from bushfit.reading.labelled import Rows, select_rows
 from bushfit.reading.layout import DELIMITERS, FileFormat, Layout, find_layout
 from bushfit.reading.parts import OpenedFile, open_file
@@ -58,22 +58,10 @@ def find_table(
     named = {role: text for role, text in columns.items() if not text.isdecimal()}
     vocabulary = Vocabulary(of_motion(names, motion), named, stated_units or {})
 
-    def lay_out(source: RowSource) -> tuple[RowSource, Layout]:
-        """Return rows and layout of the table in a part of the file; blocks and wide tables become long."""
-        delimiter = "" if isinstance(source, Sheet) else DELIMITERS.get(file_format.delimiter or "")
-        stated_line = file_format.header_line
-        layout = source.layout or find_layout(source.head(), vocabulary, delimiter=delimiter, header_line=stated_line)
-        if "amplitude" in names and stated_line is None:
-            if exchanged := exchange_rows(source, layout, vocabulary):
-                source, layout = exchanged, find_layout(exchanged.head(), vocabulary, delimiter="")
-            if wide := unpivot(source, opened.file, vocabulary, layout):
-                return wide
-        return combined(source, layout, vocabulary)
-
-    try:
-        layouts = [lay_out(part) for part in opened.parts]
-    except csv.Error as error:
-        raise MeasurementError("the table cannot be read", file=opened.file, found=str(error)) from error
+    layouts = []
+    for table, long_table in _locate(opened, named, stated_units or {}):
+        is_sweep = "amplitude" in names and file_format.header_line is None
+        layouts.append((is_sweep and unpivot(*table, opened.file, vocabulary)) or long_table)
     if len(layouts) > 1:
         layouts = [entry for entry in layouts if len(vocabulary.roles(entry[1].headers) - {"time"}) > 1]
     if len(layouts) != 1:
@@ -96,3 +84,40 @@ def find_table(
     needed = frozenset(roles[role].index for role in present)
     table = replace(table, roles=roles, notes=(*layout.notes, *notes), clocks=clocks, needed=needed)
     return replace(table, selected=select_rows(table, table.row_labels, rows)) if rows else table
+
+
+def _locate(
+    opened: OpenedFile, columns: Mapping[str, str], stated_units: Mapping[str, str]
+) -> list[tuple[tuple[RowSource, Layout], tuple[RowSource, Layout]]]:
+    """Find the header of the table in each part of a file, whatever kind of test it is; once for all kinds.
+
+    Args:
+        opened: the file, which keeps the result.
+        columns: headers that the user states, by role.
+        stated_units: units that the user states, by role.
+
+    Returns:
+        Rows and layout of each table, as it is written and with its blocks in one table.
+
+    Raises:
+        MeasurementError: a line or a quoted cell is far too long.
+    """
+    key = (*columns.items(), None, *stated_units.items())
+    if key in opened.located:
+        return opened.located[key]
+    vocabulary, stated = Vocabulary(ALL_COLUMNS, columns, stated_units), opened.stated
+    tables = []
+    try:
+        for source in opened.parts:
+            mark = "" if isinstance(source, Sheet) else DELIMITERS.get(stated.delimiter or "")
+            layout = source.layout or find_layout(
+                source.head(), vocabulary, delimiter=mark, header_line=stated.header_line
+            )
+            exchanged = None if stated.header_line else exchange_rows(source, layout, vocabulary)
+            if exchanged:
+                source, layout = exchanged, find_layout(exchanged.head(), vocabulary, delimiter="")
+            tables.append(((source, layout), combined(source, layout, vocabulary)))
+    except csv.Error as error:
+        raise MeasurementError("the table cannot be read", file=opened.file, found=str(error)) from error
+    opened.located[key] = tables
+    return tables

@@ -44,6 +44,12 @@ DISPLACEMENT_COLUMNS = {
     **_columns_of("displacements"),
     "displacement": LOOP_COLUMNS["displacement"],
 }
+_OF_TESTS = (SWEEP_COLUMNS, STRAINING_COLUMNS, LOOP_COLUMNS, RESONANCE_COLUMNS, DISPLACEMENT_COLUMNS)
+#: Names of the columns of all kinds of tests, by role, with which the header of a table is found.
+ALL_COLUMNS = {
+    role: [name for names in _OF_TESTS for name in names.get(role, ())]
+    for role in dict.fromkeys(role for names in _OF_TESTS for role in names)
+}
 #: Names of columns that assign rows to tests, by what they contain: direction, specimen_number or run.
 ROW_COLUMNS = {
     **WORDS["rows"],

@@ -2,8 +2,9 @@
 
 from collections.abc import Sequence
 from concurrent.futures import Future
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from bushfit.errors import MeasurementError, did_you_mean
 from bushfit.reading.files import join_quoted, sha256, to_utf8, view_bytes
@@ -27,12 +28,14 @@ class OpenedFile:
         checksum: SHA-256 of the file, which may still be running in a thread.
         stated: format of the file as the user states it.
         parts: text, sheets or groups of channels that can contain the table.
+        located: tables that were located already, by the columns and units that the user states; see `finding`.
     """
 
     file: Path
     checksum: Future[str]
     stated: FileFormat
     parts: Sequence[RowSource]
+    located: dict[object, Any] = field(default_factory=dict)
 
     def no_choice(self, usable: Sequence[RowSource]) -> MeasurementError:
         """Return the error for a file in which no part, or more than one (`usable`), can contain the table."""

@@ -87,14 +87,14 @@ class _WideColumn(NamedTuple):
     points: list[tuple[int, str | float, str | float]]
 
 
-def unpivot(source: RowSource, file: Path, vocabulary: Vocabulary, layout: Layout) -> tuple[RowSource, Layout] | None:
+def unpivot(source: RowSource, layout: Layout, file: Path, vocabulary: Vocabulary) -> tuple[RowSource, Layout] | None:
     """Turn a wide table into a long one, which has a row for each frequency and amplitude.
 
     Args:
         source: lines or rows of the file.
+        layout: layout of the file if it is read as a long table.
         file: path, for errors.
         vocabulary: known column names.
-        layout: layout of the file if it is read as a long table.
 
     Returns:
         Source and layout of the long table; None if the file has no wide table.
