@@ -10,6 +10,7 @@ import numpy as np
 from bushfit.geometry import Place
 from bushfit.reading.headers import ZERO_TO_PEAK
 from bushfit.reading.names import Labels, StatedQuantity, labels_in_names
+from bushfit.reading.si_columns import columns_key
 from bushfit.reading.stiffness import hint_for_convertible_columns
 from bushfit.reading.sweeps import ONE_TEST
 from bushfit.reading.table import Table
@@ -142,7 +143,7 @@ def _constant_quantity(
         f"the {role} of this test is not stated",
         found=f"{origin}: {' and '.join(quantity.text for quantity in found)}" if found else None,
         expected=f"a column for the {role}, or one number with its unit in the name of the file",
-        hint=other_way or f"{state}, or name the column: {table.columns_key(role, expected)}",
+        hint=other_way or f"{state}, or name the column: {columns_key(table, role, expected)}",
     )
 
 

@@ -19,6 +19,7 @@ from bushfit.reading.names import direction_of_file
 from bushfit.reading.parts import OpenedFile, open_file
 from bushfit.reading.resonance import is_resonance
 from bushfit.reading.roles import PAIRS, of_motion
+from bushfit.reading.si_columns import columns_key
 from bushfit.reading.stiffness import hint_for_convertible_columns, refuse_ambiguous_damping
 from bushfit.reading.table import Table
 from bushfit.validation import validate_tables
@@ -84,7 +85,7 @@ def recognize_table(file: Path, test_options: Mapping[str, Any]) -> tuple[Table,
     lacking = missing_role(best, is_sweep=is_sweep) or "force"
     units = {"displacement": "m", "force": "N", "stiffness": "N/m", "storage_stiffness": "N/m", "phase": "rad"}
     advice = hint_for_convertible_columns(best)
-    column = best.columns_key(lacking, units.get(lacking, "1"))
+    column = columns_key(best, lacking, units.get(lacking, "1"))
     raise best.header_error(
         "the columns are not those of a test",
         kind=NoTestError,

@@ -7,9 +7,7 @@ from itertools import groupby, islice, pairwise, zip_longest
 from typing import NamedTuple
 
 from bushfit import units
-from bushfit.errors import UnitError
-from bushfit.reading.cells import Cells, FaultyRow
-from bushfit.reading.headers import COUNTED, Column, Vocabulary, parse_unit, plain, split_unit
+from bushfit.reading.headers import COUNTED, Vocabulary
 from bushfit.reading.layout import Layout, Line, is_comment, is_row, is_summary_row, is_units_row
 from bushfit.reading.names import NO_LABELS, Labels, labels_above, labels_in_names, named_direction
 from bushfit.reading.numerals import is_like_number
@@ -272,53 +270,3 @@ def _with_complex_parts(source: RowSource, layout: Layout) -> tuple[RowSource, L
     layout = replace(layout, headers=tuple(headers), units=tuple(row_of_units))
     numbers, content = zip(*lines, strict=True)
     return Sheet(source.sheet or "", content, numbers=numbers, above=source.head()), layout
-
-
-def refuse_other_columns(table: Cells, left_out: Iterable[FaultyRow], vocabulary: Vocabulary) -> None:
-    """Refuse a table in which a later header or row of units changes the order or the units of the columns.
-
-    Args:
-        table: table with its columns by role.
-        left_out: rows of the table that are not data.
-        vocabulary: known column names.
-
-    Raises:
-        MeasurementError: a header repeats the columns in another order.
-        UnitError: a header or row of units states other units.
-    """
-    first = table.layout.units_line or table.layout.header_line
-    columns = sorted(table.roles.values(), key=lambda column: column.index)
-    for line, cells, _ in left_out:
-        texts = [str(cell) for cell in cells]
-        is_header, compatible, different = table.layout.is_header(texts, vocabulary), 0, list[Column]()
-        for column in columns:
-            text = texts[column.index]
-            name, unit, convention = split_unit(text) if is_header else ("", *parse_unit(text.strip("[]() "))[:2])
-            heading = vocabulary.heading(text)
-            is_same = plain(name) == plain(split_unit(column.header)[0]) or (heading and heading.role == column.role)
-            if is_header and not is_same:
-                raise table.error(
-                    "a header repeats the columns in another order",
-                    line=line,
-                    found=", ".join(filter(None, texts)),
-                    expected=f"the columns of line {table.layout.header_line}: {', '.join(table.headers)}",
-                    hint="write all blocks with the same columns, or each to a file of its own",
-                )
-            if not (unit and column.unit) or unit == "-" or is_like_number(unit):
-                continue
-            scales = [units.kelvin_scale(one) for one in (unit, column.unit)]
-            if not all(scales) and units.is_compatible(unit, column.unit):
-                scales = [(units.si_factor(one, one), 0.0) for one in (unit, column.unit)]
-            if all(scales):
-                compatible += 1
-                different += [column] * (scales[0] != scales[1] or convention not in (None, column.convention))
-        if different and (is_header or compatible > 1):
-            raise UnitError(
-                f"the {different[0].role.replace('_', ' ')} has two units",
-                file=table.file,
-                place=table.place(line, different[0]),
-                found=f"{', '.join(texts[column.index] for column in different)} on line {line}, "
-                f"{', '.join(str(column.unit) for column in different)} on line {first}",
-                expected="the same units in all blocks of a file",
-                hint="convert all blocks to the same units, or write each to a file of its own",
-            )

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from bushfit import units
 from bushfit.errors import NoColumnError, UnitError
-from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Motion
-from bushfit.reading.cells import Cells
+from bushfit.geometry import ROTATION, STRAINING, TRANSLATION
 from bushfit.reading.headers import (
     LOOP_COLUMNS,
     SWEEP_COLUMNS,
@@ -28,6 +27,7 @@ from bushfit.reading.headers import (
 )
 from bushfit.reading.numerals import is_like_number, plainest_value
 from bushfit.reading.roles import of_motion, si_unit
+from bushfit.reading.table import Table
 from bushfit.reading.times import clock
 
 #: Smallest similarity, from 0 to 1, of a header that is suggested for a missing one; chosen: one word of two suffices.
@@ -57,26 +57,19 @@ _BY_UNIT: dict[str, str | None] = {
 
 
 def classify(
-    cells: Cells,
-    names: Mapping[str, Sequence[str]],
-    motion: Motion,
-    vocabulary: Vocabulary,
-    columns: Mapping[str, str],
-    stated_units: Mapping[str, str],
-) -> tuple[dict[str, Column], tuple[str, ...], frozenset[int]]:
+    table: Table, vocabulary: Vocabulary, columns: Mapping[str, str], stated_units: Mapping[str, str]
+) -> Table:
     """Find the role of each column, such as "displacement", from its header, its unit and the user's statements.
 
     Args:
-        cells: header and rows of the table.
-        names: usual column names, by role.
-        motion: kind of motion: translation, rotation or strain.
+        table: header and rows, with the names of the columns of a kind of test.
         vocabulary: known column names, with those that the user states.
         columns: header or number of a column as the user states it, by role.
         stated_units: units as the user states them, by role.
 
     Returns:
-        Columns by role, sentences on columns that were recognised only by their unit, and the indices of columns that
-        contain times as texts.
+        Table with its columns by role, sentences on columns that were recognised only by their unit, and the indices of
+        columns that contain times as texts.
 
     Raises:
         MeasurementError: it is not clear from the header which column has which role.
@@ -84,9 +77,9 @@ def classify(
     """
     roles: dict[str, Column] = {}
     rejected: set[str] = set()
-    role_by_index = _stated_indices(cells, vocabulary, columns)
-    for index, header in sorted(enumerate(cells.headers), key=lambda column: _name(column[1]) == "k"):  # after K*
-        heading = vocabulary.heading(header, cells.layout.units[index]) if header else None
+    role_by_index = _stated_indices(table, vocabulary, columns)
+    for index, header in sorted(enumerate(table.headers), key=lambda column: _name(column[1]) == "k"):  # after K*
+        heading = vocabulary.heading(header, table.layout.units[index]) if header else None
         if index in role_by_index:
             meaning = Vocabulary({"": [units.split_header(header)[0]]}, {"": header}).heading(header)
             heading = replace(meaning or Heading(""), role=role_by_index[index])
@@ -94,30 +87,32 @@ def classify(
             continue
         if heading is None or (_name(header) == "k" and heading.role in roles):
             continue
-        role, column = heading.role, _column_of(cells, heading, index, stated_units.get(heading.role))
+        role, column = heading.role, _column_of(table, heading, index, stated_units.get(heading.role))
         if role not in roles:
             roles[role] = column
         elif role in _REPLACEABLE:
             rejected.add(role)
             del roles[role]
         else:
-            roles[role] = _preferred(cells, roles[role], column)
+            roles[role] = _preferred(table, roles[role], column)
     for role in ("amplitude_reached", "acceleration"):
         if role in roles and "amplitude" not in roles:
             roles["amplitude"] = replace(roles.pop(role), role="amplitude")
-    notes, unused = _add_by_unit(cells, roles, names, motion)
+    notes, unused = _add_by_unit(table, roles)
     if {"displacement", "force"} <= {*roles} and "displacement" not in columns:
-        for column in (one for one in unused if _moves_along(cells, roles["displacement"], one)):
-            _preferred(cells, roles["displacement"], replace(column, role="displacement"))
+        for column in (one for one in unused if _moves_along(table, roles["displacement"], one)):
+            _preferred(table, roles["displacement"], replace(column, role="displacement"))
     for column in (roles[role] for role in stated_units if role in roles):
-        written = parse_unit(split_unit(column.header)[1] or cells.layout.units[column.index])[0]
+        written = parse_unit(split_unit(column.header)[1] or table.layout.units[column.index])[0]
         if written != column.unit and units.is_compatible(written, column.unit or ""):
             notes.append(f'"{column.header}" is read in {column.unit}, as stated, and not in {written}')
     if {"force_amplitude", "stiffness"} & set(roles) and "amplitude" not in roles:
-        notes += _add_motion_as_amplitude(cells, roles, stated_units)
+        notes += _add_motion_as_amplitude(table, roles, stated_units)
     time = roles.get("time")
-    is_clock = time is not None and clock(str(cells.first_row[time.index])) is not None
-    return roles, tuple(notes), frozenset({time.index} if time and is_clock else ())
+    is_clock = time is not None and clock(str(table.first_row[time.index])) is not None
+    notes = [*table.layout.notes, *notes]
+    clocks = frozenset({time.index} if time and is_clock else ())
+    return replace(table, roles=roles, notes=tuple(notes), clocks=clocks)
 
 
 def _name(header: str) -> str:
@@ -125,11 +120,11 @@ def _name(header: str) -> str:
     return plain(units.split_header(split_convention(header)[0])[0])
 
 
-def _stated_indices(cells: Cells, vocabulary: Vocabulary, columns: Mapping[str, str]) -> dict[int, str]:
+def _stated_indices(table: Table, vocabulary: Vocabulary, columns: Mapping[str, str]) -> dict[int, str]:
     """Find the columns that the user states by their number; stated headers are only checked.
 
     Args:
-        cells: header and rows of the table.
+        table: header and rows of the table.
         vocabulary: known column names, with those that the user states.
         columns: header or number of a column as the user states it, by role.
 
@@ -141,10 +136,10 @@ def _stated_indices(cells: Cells, vocabulary: Vocabulary, columns: Mapping[str, 
         MeasurementError: one header for two roles.
     """
     indices, role_by_text = dict[int, str](), dict[str, str]()
-    named_roles = vocabulary.roles([header for header in cells.headers if header])
+    named_roles = vocabulary.roles([header for header in table.headers if header])
     for role, text in columns.items():
         if (first_role := role_by_text.setdefault(plain(text), role)) != role:
-            raise cells.header_error(
+            raise table.header_error(
                 "one column is named for two roles",
                 found=f'"{text}" for the {first_role.replace("_", " ")} and the {role.replace("_", " ")}',
                 expected="a column for each",
@@ -152,12 +147,12 @@ def _stated_indices(cells: Cells, vocabulary: Vocabulary, columns: Mapping[str, 
             )
     for role, text in columns.items():
         number = int(text) if text.isdecimal() and len(text) < 5 else 0
-        if 1 <= number <= len(cells.headers):
+        if 1 <= number <= len(table.headers):
             indices[number - 1] = role
         elif role not in named_roles:
-            near = next(iter(get_close_matches(text, cells.headers if cells.is_table else (), 1, _ALIKE)), "")
+            near = next(iter(get_close_matches(text, table.headers if table.is_table else (), 1, _ALIKE)), "")
             advice = f'did you mean "{near}"?' if near else "name one of this file:"
-            raise cells.header_error(
+            raise table.header_error(
                 f'there is no column "{text}"',
                 kind=NoColumnError,
                 expected=f"the header that was stated for the {role.replace('_', ' ')}, or its number",
@@ -166,28 +161,28 @@ def _stated_indices(cells: Cells, vocabulary: Vocabulary, columns: Mapping[str, 
     return indices
 
 
-def _column_of(cells: Cells, heading: Heading, index: int, stated_unit: str | None = None) -> Column:
+def _column_of(table: Table, heading: Heading, index: int, stated_unit: str | None = None) -> Column:
     """Make the column of a header, with the unit that the user states, or else that of header and units row.
 
     Args:
-        cells: header and rows of the table.
+        table: header and rows of the table.
         heading: meaning of the header: role (quantity, such as "force"), unit and convention.
         index: index of the column.
         stated_unit: unit that the user states; None without one.
     """
     multiple = _MULTIPLE.sub(r"x \g<0>", stated_unit or "")
-    from_user, in_row = (parse_unit(text) for text in (multiple, cells.layout.units[index]))
+    from_user, in_row = (parse_unit(text) for text in (multiple, table.layout.units[index]))
     in_header = parse_unit(heading.unit or "")
     texts = [from_user[0]] if stated_unit else sorted({in_header[0], in_row[0]} - {""})
     conventions = {from_user[1] or part for part in (heading.convention, in_header[1], in_row[1], from_user[1]) if part}
     logarithm = from_user[2] or in_row[2] or in_header[2] or heading.logarithm
     unit, convention = next(iter(texts), None), next(iter(conventions), None)
-    column = Column(heading.role, unit, convention, logarithm, header=cells.headers[index], index=index)
+    column = Column(heading.role, unit, convention, logarithm, header=table.headers[index], index=index)
     if len(texts) > 1 or len(conventions) > 1:
         raise UnitError(
             f"two units for the {heading.role.replace('_', ' ')}",
-            file=cells.file,
-            place=cells.place(cells.layout.header_line, column),
+            file=table.file,
+            place=table.place(table.layout.header_line, column),
             found=" and ".join(texts if len(texts) > 1 else sorted(conventions)),
             expected="one unit, from the header or the units row",
             hint=f'state the right one in the campaign: units = {{ {heading.role} = "{texts[0]}" }}',
@@ -195,17 +190,17 @@ def _column_of(cells: Cells, heading: Heading, index: int, stated_unit: str | No
     return column
 
 
-def _first_numbers(cells: Cells, columns: Sequence[Column]) -> NDArray[np.float64]:
+def _first_numbers(table: Table, columns: Sequence[Column]) -> NDArray[np.float64]:
     """Numbers in the first rows of columns, (rows, columns), in units of the file; no rows if a cell is no number."""
-    rows = [[plainest_value(str(row[column.index])) for column in columns] for row in cells.first_rows]
+    rows = [[plainest_value(str(row[column.index])) for column in columns] for row in table.first_rows]
     return np.empty((0, len(columns))) if np.isnan(rows).any() else np.array(rows)
 
 
-def _preferred(cells: Cells, first: Column, second: Column) -> Column:
+def _preferred(table: Table, first: Column, second: Column) -> Column:
     """Choose between two columns for one quantity: frequency in Hz rather than rad/s, else the first of two equal ones.
 
     Args:
-        cells: header and rows of the table.
+        table: header and rows of the table.
         first, second: the two columns.
 
     Raises:
@@ -218,9 +213,9 @@ def _preferred(cells: Cells, first: Column, second: Column) -> Column:
             return first if angular[1] else second
     if role == "time" and (first.unit is None) != (second.unit is None):
         return first if first.unit else second
-    numbers = _first_numbers(cells, both)
+    numbers = _first_numbers(table, both)
     factors = np.array([ZERO_TO_PEAK[column.convention or "zero-to-peak"] for column in both])
-    is_equal = all(row[first.index] == row[second.index] for row in cells.first_rows)
+    is_equal = all(row[first.index] == row[second.index] for row in table.first_rows)
     is_numbered = first.header == second.header
     problem, expected = f"more than one column could be the {role.replace('_', ' ')}", "one"
     if factors[0] != factors[1] and first.unit == second.unit and len(numbers):
@@ -230,42 +225,39 @@ def _preferred(cells: Cells, first: Column, second: Column) -> Column:
         if is_equal:
             problem = "two columns with equal numbers contradict each other"
             expected = f'"{second.header}" to be {factors[0] / factors[1]:.3g} times "{first.header}"'
-    elif is_equal and all(row[first.index] == row[second.index] for _, row in cells.rows()):
+    elif is_equal and all(row[first.index] == row[second.index] for _, row in table.rows()):
         return first
     choices = [str(column.index + 1) if is_numbered else column.header for column in both]
     keys = " or ".join(f'columns = {{ {role} = "{choice}" }}' for choice in choices)
     hint = f"{'give each column its own header, or ' if is_numbered else ''}choose it in the campaign: {keys}"
-    raise cells.header_error(problem, found=f"{first.header}, {second.header}", expected=expected, hint=hint)
+    raise table.header_error(problem, found=f"{first.header}, {second.header}", expected=expected, hint=hint)
 
 
-def _add_by_unit(
-    cells: Cells, roles: dict[str, Column], names: Mapping[str, Sequence[str]], motion: Motion
-) -> tuple[list[str], list[Column]]:
+def _add_by_unit(table: Table, roles: dict[str, Column]) -> tuple[list[str], list[Column]]:
     """Recognise columns by their unit and words in their name, and add them to the known columns.
 
     A column is added if no other column has such a unit, apart from set points and means. Frequency, amplitude and
     phase are added only to a table with a stiffness or a force amplitude.
 
     Args:
-        cells: header and rows of the table.
+        table: header and rows of the table.
         roles: columns found so far, by role such as "force"; changed in place.
-        names: usual column names, by role.
-        motion: kind of motion: translation, rotation or strain.
 
     Returns:
         A sentence on each added column, and the columns that are still unknown.
     """
-    if len(roles) + len(cells.headers) < 3:
+    if len(roles) + len(table.headers) < 3:
         return [], []
+    names, motion = table.names, table.motion
     usual = Vocabulary(of_motion({**LOOP_COLUMNS, **SWEEP_COLUMNS}, motion), {}, {})
     free: dict[Column, set[str]] = {}
-    for index, header in enumerate(cells.headers):
-        if not (header or cells.layout.units[index]) or usual.heading(header) is not None:
+    for index, header in enumerate(table.headers):
+        if not (header or table.layout.units[index]) or usual.heading(header) is not None:
             continue
         name, unit, convention = split_unit(header)  # after the check, because unknown words import pint
         words = {plain(word) for word in name.replace("_", " ").replace("/", " ").split()}
         if not words & _QUALIFIERS["not_measured"]:
-            in_row, of_row, _ = parse_unit(cells.layout.units[index])
+            in_row, of_row, _ = parse_unit(table.layout.units[index])
             column = Column("", in_row or unit, convention or of_row, header=header, index=index)
             is_strain = motion is STRAINING and any(strain in plain(name) for strain in _STRAINS)
             free[column] = words | ({"amplitude"} if column.convention or is_strain else set())
@@ -285,7 +277,7 @@ def _add_by_unit(
             for column, words in free.items()
             if (words & _QUALIFIERS[qualifier] if qualifier else role not in LOOP_COLUMNS or not words & amplitude)
             and any(units.is_compatible(column.unit or "", si) for si in expected)
-            and is_like_number(str(cells.first_row[column.index]))
+            and is_like_number(str(table.first_row[column.index]))
         ]
         if len(fitting) == 1:
             roles[role] = replace(fitting[0], role=role)
@@ -293,18 +285,18 @@ def _add_by_unit(
             header = f'"{fitting[0].header}"' if fitting[0].header else f"column {fitting[0].index + 1}"
             notes.append(f"{header} is read as the {role.replace('_', ' ')} by its unit")
     if "time" in names and "time" not in roles:
-        stamps = [column for column in free if clock(str(cells.first_row[column.index])) is not None]
+        stamps = [column for column in free if clock(str(table.first_row[column.index])) is not None]
         roles |= {"time": replace(stamps[0], role="time")} if len(stamps) == 1 else {}
     return notes, list(free)
 
 
-def _moves_along(cells: Cells, first: Column, second: Column) -> bool:
+def _moves_along(table: Table, first: Column, second: Column) -> bool:
     """Return True if a second column records the motion of a displacement in another size, as an extensometer does."""
     if not (first.unit and second.unit and units.is_compatible(second.unit, first.unit)):
         return False
-    channels = replace(cells, roles={"first": first, "second": second})  # whose cells show the decimal mark
+    channels = replace(table, roles={"first": first, "second": second})  # whose cells show the decimal mark
     start = channels.parse(next(channels.blocks()), frozenset((first.index, second.index)))  # far beyond the first rows
-    numbers = np.array([start[first.index], start[second.index]]).T if start else _first_numbers(cells, (first, second))
+    numbers = np.array([start[first.index], start[second.index]]).T if start else _first_numbers(table, (first, second))
     numbers = numbers * [units.si_factor(unit, first.unit) for unit in (first.unit, second.unit)]
     spans = [float(np.ptp(values)) for values in numbers.T] if len(numbers) else [0.0, 0.0]
     if min(spans) <= 0.0 or abs(spans[1] / spans[0] - 1.0) <= _AGREEMENT:
@@ -312,13 +304,13 @@ def _moves_along(cells: Cells, first: Column, second: Column) -> bool:
     return float(np.min(np.corrcoef(numbers.T))) > _ALONG
 
 
-def _add_motion_as_amplitude(cells: Cells, roles: dict[str, Column], stated_units: Mapping[str, str]) -> list[str]:
+def _add_motion_as_amplitude(table: Table, roles: dict[str, Column], stated_units: Mapping[str, str]) -> list[str]:
     """Use a column that is named like a displacement as the amplitude of a sweep, and add it to the known columns.
 
     The table must have a force amplitude; a stiffness, if there is one, must agree with force over displacement.
 
     Args:
-        cells: header and rows of the table.
+        table: header and rows of the table.
         roles: columns found so far, by role such as "force"; changed in place.
         stated_units: units as the user states them, by role.
 
@@ -327,8 +319,8 @@ def _add_motion_as_amplitude(cells: Cells, roles: dict[str, Column], stated_unit
     """
     motions = Vocabulary({"amplitude": [*LOOP_COLUMNS["displacement"], "x", "u", "s", "w"]}, {})
     candidates = [
-        _column_of(cells, heading, index, stated_units.get("amplitude"))
-        for index, header in enumerate(cells.headers)
+        _column_of(table, heading, index, stated_units.get("amplitude"))
+        for index, header in enumerate(table.headers)
         if header and (heading := motions.heading(header)) and not heading.logarithm
     ]
     fitting = [c for c in candidates if any(units.is_compatible(c.unit or "", si) for si in ("m", "rad"))]
@@ -340,7 +332,7 @@ def _add_motion_as_amplitude(cells: Cells, roles: dict[str, Column], stated_unit
         expected = [(column.unit or "", si_unit(column.role, motion)) for column in columns]
         if not all(units.is_compatible(*pair) for pair in expected):
             return []
-        x, force, stiffness = np.abs([units.si_factor(*pair) for pair in expected] * _first_numbers(cells, columns)).T
+        x, force, stiffness = np.abs([units.si_factor(*pair) for pair in expected] * _first_numbers(table, columns)).T
         if x.size == 0 or not np.all(np.abs(stiffness * x - force) <= _STIFFNESS_AGREEMENT * force):
             return []
     roles["amplitude"] = fitting[0]

@@ -14,6 +14,7 @@ from bushfit.reading.layout import FileFormat
 from bushfit.reading.loops import increasing_time, time_column
 from bushfit.reading.measurement import Floats
 from bushfit.reading.names import direction_of_file
+from bushfit.reading.si_columns import si_column
 
 #: Smallest number of rows of a history, and largest number of evenly sampled rows; chosen: their results take 2 GB.
 FEWEST_ROWS, _MOST_ROWS = 10, 10_000_000
@@ -81,7 +82,7 @@ def read_displacements(
     if not roles:
         turns = table.agrees("displacement", "rad")
         tested = named_places[0] if motion else Direction.TORSION if turns else Direction.AXIAL
-        column = table.column("displacement", tested)
+        column = si_column(table, "displacement", tested)
         axis = direction_of_file(table.file, [column.header], turns=turns, sheet=table.source.sheet)
         if axis and not motion:
             named_places = [place for place in named_places or get_places(axis, specimens) if place.axis == axis]
@@ -93,7 +94,7 @@ def read_displacements(
                 hint=f"state it: --direction {next(map(repr, map(str, named_places)), 'axial (or radial, torsion)')}",
             )
         roles = dict.fromkeys(named_places, "displacement")
-    wanted = {role: table.column(role, place) for place, role in roles.items()}
+    wanted = {role: si_column(table, role, place) for place, role in roles.items()}
     rate = None if "time" in table.roles else table.sampling_rate
     wanted |= {} if rate else {"time": time_column(table, next(iter(roles)))}
     values, notes = table.read(wanted, fewest_rows=FEWEST_ROWS)

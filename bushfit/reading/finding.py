@@ -54,42 +54,39 @@ def find_table(
         UnitError: two different units for one column.
     """
     opened = file if isinstance(file, OpenedFile) else open_file(file, file_format or FileFormat())
-    file_format, columns = opened.stated, dict(columns or {})
+    columns, stated_units, header_line = dict(columns or {}), dict(stated_units or {}), opened.stated.header_line
     named = {role: text for role, text in columns.items() if not text.isdecimal()}
-    vocabulary = Vocabulary(of_motion(names, motion), named, stated_units or {})
-
-    layouts = []
-    for table, long_table in _locate(opened, named, stated_units or {}):
-        is_sweep = "amplitude" in names and file_format.header_line is None
-        layouts.append((is_sweep and unpivot(*table, opened.file, vocabulary)) or long_table)
+    vocabulary = Vocabulary(of_motion(names, motion), named, stated_units)
+    may_be_wide = "amplitude" in names and header_line is None
+    layouts = [
+        (may_be_wide and unpivot(*as_written, opened.file, vocabulary)) or in_one
+        for as_written, in_one in _locate(opened, named, stated_units)
+    ]
     if len(layouts) > 1:
         layouts = [entry for entry in layouts if len(vocabulary.roles(entry[1].headers) - {"time"}) > 1]
     if len(layouts) != 1:
         raise opened.no_choice([source for source, _ in layouts])
-    source, layout = layouts[0]
-    if file_format.header_line not in (None, layout.header_line):
-        found = f"header_line = {file_format.header_line}"
+    table = Table(opened, *layouts[0], names, motion)
+    if header_line not in (None, table.layout.header_line):
         problem, hint = "there is no header on this line", "lines count from 1"
-        raise MeasurementError(problem, file=opened.file, found=found, hint=hint)
-    table = Table(opened, source, layout, names, motion)
+        raise MeasurementError(problem, file=opened.file, found=f"header_line = {header_line}", hint=hint)
     if len(table.headers) < 2:
         expected = f"{_EXPECTED_HEADER}, separated by comma, semicolon, tab, | or blanks"
         raise table.header_error("there is only one column", expected=expected)
-    if layout.headerless and not any(text.isdecimal() for text in columns.values()):
+    if table.layout.headerless and not any(text.isdecimal() for text in columns.values()):
         hint = f"name the columns by their numbers in the campaign, and their units: {_NUMBERED_COLUMNS}"
         raise table.header_error("there is no header", found=None, expected=_EXPECTED_HEADER, hint=hint)
-    roles, notes, clocks = classify(table, names, motion, vocabulary, columns, stated_units or {})
-    essential = ({"displacement", "force"}, *(set(pair) for pair in PAIRS))
-    present = next((pair for pair in essential if pair <= set(roles)), set(roles) & {"displacement", "force"})
-    needed = frozenset(roles[role].index for role in present)
-    table = replace(table, roles=roles, notes=(*layout.notes, *notes), clocks=clocks, needed=needed)
+    table = classify(table, vocabulary, columns, stated_units)
+    essential = ({"displacement", "force"}, *map(set, PAIRS))
+    present = next((pair for pair in essential if pair <= set(table.roles)), {"displacement", "force"})
+    table = table.needing({role: table.roles[role] for role in present if role in table.roles})
     return replace(table, selected=select_rows(table, table.row_labels, rows)) if rows else table
 
 
 def _locate(
     opened: OpenedFile, columns: Mapping[str, str], stated_units: Mapping[str, str]
 ) -> list[tuple[tuple[RowSource, Layout], tuple[RowSource, Layout]]]:
-    """Find the header of the table in each part of a file, whatever kind of test it is; once for all kinds.
+    """Find the header of the table in each part of a file, once for all kinds of tests.
 
     Args:
         opened: the file, which keeps the result.
@@ -97,27 +94,23 @@ def _locate(
         stated_units: units that the user states, by role.
 
     Returns:
-        Rows and layout of each table, as it is written and with its blocks in one table.
+        Rows and layout of each table: as it is written, and with its blocks in one table.
 
     Raises:
         MeasurementError: a line or a quoted cell is far too long.
     """
-    key = (*columns.items(), None, *stated_units.items())
-    if key in opened.located:
-        return opened.located[key]
-    vocabulary, stated = Vocabulary(ALL_COLUMNS, columns, stated_units), opened.stated
-    tables = []
-    try:
-        for source in opened.parts:
-            mark = "" if isinstance(source, Sheet) else DELIMITERS.get(stated.delimiter or "")
-            layout = source.layout or find_layout(
-                source.head(), vocabulary, delimiter=mark, header_line=stated.header_line
-            )
-            exchanged = None if stated.header_line else exchange_rows(source, layout, vocabulary)
-            if exchanged:
-                source, layout = exchanged, find_layout(exchanged.head(), vocabulary, delimiter="")
-            tables.append(((source, layout), combined(source, layout, vocabulary)))
-    except csv.Error as error:
-        raise MeasurementError("the table cannot be read", file=opened.file, found=str(error)) from error
-    opened.located[key] = tables
-    return tables
+    key = tuple(columns.items()), tuple(stated_units.items())
+    if key not in opened.located:
+        vocabulary, stated = Vocabulary(ALL_COLUMNS, columns, stated_units), opened.stated
+        located = opened.located[key] = []
+        try:
+            for source in opened.parts:
+                mark = "" if isinstance(source, Sheet) else DELIMITERS.get(stated.delimiter or "")
+                layout = source.layout or find_layout(source.head(), vocabulary, mark, stated.header_line)
+                exchanged = None if stated.header_line else exchange_rows(source, layout, vocabulary)
+                if exchanged:
+                    source, layout = exchanged, find_layout(exchanged.head(), vocabulary, "")
+                located.append(((source, layout), combined(source, layout, vocabulary)))
+        except csv.Error as error:
+            raise MeasurementError("the table cannot be read", file=opened.file, found=str(error)) from error
+    return opened.located[key]

@@ -1,16 +1,21 @@
 """Columns that assign rows to tests: direction, part and run."""
 
+from __future__ import annotations
+
 from collections.abc import Iterator, Mapping, Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bushfit.reading.cells import Cells
 from bushfit.reading.headers import ROW_COLUMNS, Vocabulary
 from bushfit.reading.measurement import Floats
 from bushfit.reading.names import named_direction
 from bushfit.reading.runs import group_rows
+from bushfit.reading.source import RowSource, Text
+
+if TYPE_CHECKING:
+    from bushfit.reading.table import Table
 
 #: Smallest mean number of rows per distinct text in a column that assigns rows to tests; chosen: a row counter has one.
 _FEWEST_ROWS = 3
@@ -50,13 +55,13 @@ def same_text(text: str, reference: str) -> bool:
     return text.strip(" #").casefold() == reference.strip(" #").casefold()
 
 
-def column_texts(cells: Cells, *indices: int) -> Iterator[ColumnTexts]:
+def column_texts(table: Table, *indices: int) -> Iterator[ColumnTexts]:
     """Find the texts of columns; an empty or merged cell has the text of the cell above.
 
     Yields:
         Texts of the column with each index.
     """
-    blocks = [list(cells.texts(block, indices)) for block in cells.blocks()] if indices else []
+    blocks = [list(_distinct_cells(table, block, indices)) for block in table.blocks()] if indices else []
     for column in zip(*blocks, strict=True):
         number_by_text, parts = dict[str, int](), list[NDArray[np.intp]]()
         for rows, distinct in column:
@@ -69,20 +74,40 @@ def column_texts(cells: Cells, *indices: int) -> Iterator[ColumnTexts]:
         yield ColumnTexts(list(number_by_text), codes)
 
 
+def _distinct_cells(
+    table: Table, block: RowSource, indices: Sequence[int]
+) -> Iterator[tuple[NDArray[Any], NDArray[Any]]]:
+    """Find the distinct cells of columns, texts or numbers, in a block of rows.
+
+    Yields:
+        For each column, the index among its distinct cells of each of the n rows of data, (n,), and these cells.
+    """
+    import pandas as pd
+
+    if isinstance(block, Text) and table.layout.delimiter != " " and not table.marks and b'"' not in block.data:
+        is_clean, types = table.parse(block, table.needed) is not None, dict.fromkeys(indices, "category")
+        frame = block.frame(table.layout, types, len(table.headers), ".") if is_clean else None
+        if frame is not None:
+            yield from (frame[index].factorize() for index in indices)
+            return
+    rows = [row for _, row in table.rows(block)]
+    yield from (pd.factorize(np.array([row[index] for row in rows], dtype=object)) for index in indices)
+
+
 def _text(cell: str | float) -> str:
     """Text of a cell; a number has up to twelve digits."""
     return cell if isinstance(cell, str) else f"{cell:.12g}"
 
 
-def _may_distinguish_tests(cells: Cells, index: int) -> bool:
+def _may_distinguish_tests(table: Table, index: int) -> bool:
     """Return True if a column contains no measured quantity and few distinct texts, which may distinguish tests."""
-    if not cells.headers[index] or index in {column.index for column in cells.roles.values()}:
+    if not table.headers[index] or index in {column.index for column in table.roles.values()}:
         return False
-    first = [_text(row[index]) for row in cells.first_rows]
+    first = [_text(row[index]) for row in table.first_rows]
     return any(first) and _FEWEST_ROWS * len({text for text in first if text}) <= len(first)
 
 
-def find_labels(cells: Cells) -> Mapping[str, tuple[int, Sequence[str]]]:
+def find_labels(table: Table) -> Mapping[str, tuple[int, Sequence[str]]]:
     """Find the columns that state the direction, the part (specimen_number) and the run of each row.
 
     Returns:
@@ -90,12 +115,12 @@ def find_labels(cells: Cells) -> Mapping[str, tuple[int, Sequence[str]]]:
         column is missing.
     """
     labels: dict[str, tuple[int, Sequence[str]]] = {}
-    for index, header in enumerate(cells.headers):
+    for index, header in enumerate(table.headers):
         heading = _LABELS.heading(header) if header else None
-        if heading is None or heading.role in labels or (header == "block" and "displacement" not in cells.roles):
+        if heading is None or heading.role in labels or (header == "block" and "displacement" not in table.roles):
             continue
-        if _may_distinguish_tests(cells, index):
-            (texts,) = column_texts(cells, index)
+        if _may_distinguish_tests(table, index):
+            (texts,) = column_texts(table, index)
             if heading.role == "direction":
                 directions = [named_direction([text], short=True) for text in texts.distinct]
                 if not any(directions):
@@ -106,11 +131,11 @@ def find_labels(cells: Cells) -> Mapping[str, tuple[int, Sequence[str]]]:
     return labels
 
 
-def select_rows(cells: Cells, labels: Mapping[str, tuple[int, Sequence[str]]], wanted: Rows) -> frozenset[int] | None:
+def select_rows(table: Table, labels: Mapping[str, tuple[int, Sequence[str]]], wanted: Rows) -> frozenset[int] | None:
     """Select the rows of one test in a file that may contain several tests.
 
     Args:
-        cells: table with all rows.
+        table: table with all rows.
         labels: columns that assign rows to tests, see `find_labels`.
         wanted: texts that the rows must have in these and other columns.
 
@@ -124,40 +149,40 @@ def select_rows(cells: Cells, labels: Mapping[str, tuple[int, Sequence[str]]], w
     wanted_texts = {"direction": wanted.direction, "specimen_number": wanted.specimen_number}
     chosen = [(*labels[key], text) for key, text in wanted_texts.items() if text and key in labels]
     for header, text in wanted.texts.items():
-        if header not in cells.headers:
-            raise cells.header_error(f'there is no column "{header}"', expected="headers, as keys of rows")
-        index = cells.headers.index(header)
-        chosen.append((index, next(column_texts(cells, index)).per_row(), text))
+        if header not in table.headers:
+            raise table.header_error(f'there is no column "{header}"', expected="headers, as keys of rows")
+        index = table.headers.index(header)
+        chosen.append((index, next(column_texts(table, index)).per_row(), text))
     if wanted.shared and not chosen:
         expected = "each file once, or a column that selects the rows of each test"
-        raise cells.header_error("a file is listed twice", expected=expected)
+        raise table.header_error("a file is listed twice", expected=expected)
     column, parts = labels.get("specimen_number", (0, ()))
     total = len(parts or (chosen[0][1] if chosen else ()))
     selected = [n for n in range(total) if all(same_text(texts[n], text) for _, texts, text in chosen)]
     several = len({parts[n] for n in selected}) > 1 if parts else False
     if several or (chosen and not selected):
         conflicts = [(column, parts, "one part")] if several else chosen
-        raise cells.header_error(
+        raise table.header_error(
             "this file contains tests of several parts" if several else "no row is of this test",
             found="; ".join(
-                f'{", ".join(dict.fromkeys(texts))} in column "{cells.headers[index]}"' for index, texts, _ in conflicts
+                f'{", ".join(dict.fromkeys(texts))} in column "{table.headers[index]}"' for index, texts, _ in conflicts
             ),
             expected=" and ".join(text for *_, text in conflicts),
             hint='state one of them, as specimen_number = "..."; bushfit init lists all tests of a file',
         )
     if not chosen or len(selected) == total:
         return None
-    positions = [n for n, (*_, fault) in enumerate(cells.all_rows()) if fault is None]
+    positions = [n for n, (*_, fault) in enumerate(table.all_rows()) if fault is None]
     return frozenset(positions[n] for n in selected)
 
 
 def note_not_understood(
-    cells: Cells, labels: Mapping[str, tuple[int, Sequence[str]]], rows: NDArray[np.intp] | None, *settled: Floats
+    table: Table, labels: Mapping[str, tuple[int, Sequence[str]]], rows: NDArray[np.intp] | None, *settled: Floats
 ) -> Iterator[str]:
     """Warn of columns that may distinguish several tests in one file, but whose meaning is not known.
 
     Args:
-        cells: table with all rows.
+        table: table with all rows.
         labels: columns that assign rows to tests, see `find_labels`.
         rows: indices of the rows that were read, (n,); None for all.
         settled: frequency and nominal amplitude of these rows, (n,) each; none for a loop. Numbers that are constant at
@@ -169,14 +194,14 @@ def note_not_understood(
     understood = {index for key, (index, texts) in labels.items() if key != "direction" or len({*texts}) == 1}
     unclear = [
         index
-        for index, header in enumerate(cells.headers)
+        for index, header in enumerate(table.headers)
         if index not in understood
         and header != "block"
-        and (settled or not cells.holds_numbers(index))
-        and _may_distinguish_tests(cells, index)
+        and (settled or not table.holds_numbers(index))
+        and _may_distinguish_tests(table, index)
     ]
-    for index, texts in zip(unclear, column_texts(cells, *unclear), strict=True):
-        header, is_number = cells.headers[index], cells.holds_numbers(index)
+    for index, texts in zip(unclear, column_texts(table, *unclear), strict=True):
+        header, is_number = table.headers[index], table.holds_numbers(index)
         codes = texts.codes if rows is None else texts.codes[rows]
         present, number, counts = np.unique(codes, return_inverse=True, return_counts=True)
         depends_on = [settled] if is_number else [(quantity,) for quantity in settled]

@@ -154,7 +154,7 @@ def is_comment(content: Content, delimiter: str) -> bool:
 
 
 def find_layout(
-    lines: Sequence[Line], vocabulary: Vocabulary, *, delimiter: str | None = None, header_line: int | None = None
+    lines: Sequence[Line], vocabulary: Vocabulary, delimiter: str | None = None, header_line: int | None = None
 ) -> Layout:
     """Find the header of a table: the line that names most columns of a test and is followed by rows as long.
 

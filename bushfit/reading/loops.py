@@ -13,6 +13,7 @@ from bushfit.reading.labelled import Rows, note_not_understood
 from bushfit.reading.measurement import Floats, Loop
 from bushfit.reading.parts import OpenedFile
 from bushfit.reading.preload import parse_preload
+from bushfit.reading.si_columns import si_column
 from bushfit.reading.source import LEAST_VALUE
 from bushfit.reading.stated import LoopFile
 from bushfit.reading.table import Table
@@ -117,7 +118,7 @@ def loop_columns(table: Table, direction: Place, test: LoopFile) -> dict[str, Co
             hint="correct the header, or name the columns in the campaign: columns = "
             f'{{ displacement = "{force}", force = "{displacement}" }}',
         )
-    wanted = {role: table.column(role, direction) for role in ("displacement", "force")}
+    wanted = {role: si_column(table, role, direction) for role in ("displacement", "force")}
     wanted["force"] = replace(wanted["force"], scale=test.force_sign * wanted["force"].scale)
     if "time" in table.roles:
         wanted["time"] = time_column(table, direction)
@@ -125,7 +126,7 @@ def loop_columns(table: Table, direction: Place, test: LoopFile) -> dict[str, Co
         rate = table.quantity_above("m/s") or "10 mm/min"
         hint = f'or state rate = "{rate}", or frequency = "0.1 Hz" and waveform = "sine", or '
         hint += 'sampling_rate = "100 Hz", in the campaign'
-        table.column("time", direction, hint)
+        si_column(table, "time", direction, hint)
     return wanted
 
 
@@ -136,7 +137,7 @@ def time_column(table: Table, place: Place) -> Column:
     """
     time = table.roles.get("time")
     if time is None or time.unit or time.index in table.clocks:
-        return table.column("time", place)
+        return si_column(table, "time", place)
     with suppress(ValueError):  # which the reading of the table reports
         values = table.read({"time": time}, fewest_rows=2)[0]["time"]
         step = (values[-1] - values[0]) / (values.size - 1)
@@ -145,7 +146,7 @@ def time_column(table: Table, place: Place) -> Column:
         fitting = [scale for scale in scales if scale == DAY or abs(rate * step * scale - 1.0) < _RATE_AGREEMENT]
         if fitting:
             return replace(time, scale=fitting[0])
-    return table.column("time", place)
+    return si_column(table, "time", place)
 
 
 def increasing_time(table: Table, column: Column, time: Floats) -> tuple[Floats, tuple[str, ...]]:

@@ -9,14 +9,14 @@ import numpy as np
 from bushfit.geometry import Place
 from bushfit.reading.headers import RESONANCE_COLUMNS, WORDS, ZERO_TO_PEAK, Column
 from bushfit.reading.measurement import Complex, Floats, Source
+from bushfit.reading.rejected import check_positive
+from bushfit.reading.si_columns import si_column
 from bushfit.reading.table import Table
 
 #: Sets of columns that give a transmissibility, in order of preference.
 _COLUMN_SETS = [columns.split() for columns in WORDS["sets"]["transmissibility"]]
 #: Roles that only a resonance test has.
 _SPECIFIC = {role for role in RESONANCE_COLUMNS if role not in ("frequency", "phase")}
-#: Roles whose values must be positive.
-_POSITIVE = ("frequency", "base_acceleration", "mass_acceleration", "transmissibility")
 #: Smallest number of rows of a test; chosen: enough for a curve with five parameters and an estimate of its scatter.
 FEWEST_ROWS = 12
 
@@ -63,7 +63,7 @@ def read_resonance(table: Table, direction: Place, base_acceleration: float | No
     """
     wanted = _resonance_columns(table, direction, has_stated_base=base_acceleration is not None)
     values, _ = table.read(wanted, fewest_rows=FEWEST_ROWS)
-    table.check_positive(_POSITIVE, wanted, values)
+    check_positive(table, wanted, values)
     ratio, base = _transmissibility(values, base_acceleration)
     bad = ~(np.isfinite(ratio) & (base > 0.0) & (ratio != 0.0))
     table.refuse(bad, wanted["frequency"], "base or mass stands still here", "two accelerations that are not zero")
@@ -101,7 +101,7 @@ def _resonance_columns(table: Table, place: Place, *, has_stated_base: bool) -> 
         problem = f"the acceleration of the base is {problem}"
         raise table.header_error(problem, found=found, expected=expected, hint=hint)
     roles = [role for role in ("base_acceleration",) if role in table.roles and role not in columns]
-    wanted = {role: table.column(role, place) for role in ("frequency", *columns, *roles)}
+    wanted = {role: si_column(table, role, place) for role in ("frequency", *columns, *roles)}
     return {
         role: replace(column, scale=ZERO_TO_PEAK[column.convention or "zero-to-peak"] * column.scale)
         for role, column in wanted.items()

@@ -9,6 +9,7 @@ import numpy as np
 from bushfit.reading.headers import WORDS, Column, Vocabulary
 from bushfit.reading.measurement import Complex, Floats
 from bushfit.reading.roles import AGREEING_PAIRS, OF_MOTION, PAIRS
+from bushfit.reading.si_columns import refuse_other_motion
 from bushfit.reading.stated import SweepFile
 from bushfit.reading.table import Table
 
@@ -45,7 +46,7 @@ def stiffness_pair(table: Table) -> tuple[str, str]:
         if set(pair) <= set(table.roles):
             return pair
     for role in {role: None for pair in PAIRS for role in pair if role in OF_MOTION}:
-        table.refuse_other_motion(role)
+        refuse_other_motion(table, role)
     refuse_ambiguous_damping(table)
     usual = ", or ".join(" and ".join(pair) for pair in AGREEING_PAIRS).replace("_", " ")
     raise table.header_error(

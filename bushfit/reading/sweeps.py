@@ -17,18 +17,14 @@ from bushfit.reading.labelled import Rows, column_texts, note_not_understood
 from bushfit.reading.measurement import SAME_TEMPERATURE, Floats, Sweep
 from bushfit.reading.parts import OpenedFile
 from bushfit.reading.preload import parse_preload
+from bushfit.reading.rejected import check_positive
 from bushfit.reading.roles import AGREEING_PAIRS, si_unit
 from bushfit.reading.runs import runs_of
+from bushfit.reading.si_columns import si_column
 from bushfit.reading.stated import SweepFile
 from bushfit.reading.stiffness import check_stiffness, complex_stiffness, stiffness_pair, with_positive_loss
 from bushfit.reading.table import Table
 
-#: Roles whose values must be positive.
-_POSITIVE = (
-    *("frequency", "amplitude", "amplitude_reached", "stiffness", "storage_stiffness", "force_amplitude"),
-    *("compliance", "storage_compliance"),
-    "relative_error",
-)
 #: Smallest number of rows of a sweep; chosen: fewer show no dependence on frequency or amplitude.
 _FEWEST_SWEEP_ROWS = 3
 #: Limit of repeat numbers; chosen: a larger number is another quantity.
@@ -84,7 +80,7 @@ def read_sweep(
     columns = sweep_columns(table, direction, pair, constants, test.amplitude)
     values, notes = table.read(columns, fewest_rows=_FEWEST_SWEEP_ROWS)
     table = table.needing(columns)
-    table.check_positive(_POSITIVE, columns, values)
+    check_positive(table, columns, values)
     if "amplitude" in columns and columns["amplitude"].role == "acceleration":
         values["amplitude"] /= (2.0 * np.pi * values["frequency"]) ** 2
         notes += (f'"{columns["amplitude"].header}" is an acceleration: its amplitude is divided by (2 pi f)^2',)
@@ -161,7 +157,7 @@ def sweep_columns(
     wanted += ["temperature"] if "temperature" in numeric and roles["temperature"].unit else []
     redundant = (role for other_pair in AGREEING_PAIRS if set(other_pair) <= set(roles) for role in other_pair)
     wanted += [role for role in redundant if table.agrees(role, si_unit(role, direction.motion))]
-    columns = {role: table.column(role, direction, _HINTS.get(role)) for role in wanted}
+    columns = {role: si_column(table, role, direction, _HINTS.get(role)) for role in wanted}
     in_header = columns["amplitude"].convention if "amplitude" in columns else None
     if in_header and convention and in_header != convention:
         raise table.header_error(
@@ -212,7 +208,7 @@ def _rows_at_temperature(
     unit = table.roles["temperature"].unit
     if unit is None and temperature is None and np.ptp(values["temperature"]) <= ONE_TEST:
         return rows, None, None
-    column = table.column("temperature", direction)
+    column = si_column(table, "temperature", direction)
     kelvin = values["temperature"] + (si.kelvin_scale(unit or "") or (1.0, 0.0))[1]
     if temperature is None and np.ptp(kelvin) <= ONE_TEST:
         return rows, round(float(kelvin.mean()) - si.CELSIUS, 2) + si.CELSIUS, kelvin

@@ -1,33 +1,48 @@
-"""Table of a test: columns classified by name and unit, and their numbers in SI."""
+"""Table of a test: its rows as in the file, the roles of its columns, its numbers in SI, and errors with a place."""
 
-import math
+import csv
 import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from functools import cached_property
 from itertools import islice
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bushfit import units
-from bushfit.errors import UnitError, error_location
-from bushfit.geometry import STRAINING, TRANSLATION, Motion, Place, strain_factor_of_files
-from bushfit.reading.blocks import refuse_other_columns
-from bushfit.reading.cells import Cells, FaultyRow
-from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS, Column, Vocabulary, is_angular, parse_unit, split_unit
+from bushfit.errors import MeasurementError
+from bushfit.geometry import TRANSLATION, Motion
+from bushfit.reading.headers import Column, Vocabulary
+from bushfit.reading.instruments import word_for_part
 from bushfit.reading.labelled import find_labels
-from bushfit.reading.layout import Line
+from bushfit.reading.layout import Layout, Line, is_comment, is_row, is_summary_row
 from bushfit.reading.measurement import Floats
 from bushfit.reading.names import Labels, is_remark, labels_above
-from bushfit.reading.numerals import ALL_NUMERALS, is_like_number
-from bushfit.reading.roles import OF_MOTION, of_motion, si_unit
-from bushfit.reading.source import LARGEST_VALUE, LEAST_VALUE, RowSource, Sheet
+from bushfit.reading.notation import find_first_decimal, find_numerals
+from bushfit.reading.numerals import ALL_NUMERALS, Numerals, is_like_number
+from bushfit.reading.parts import OpenedFile
+from bushfit.reading.rejected import (
+    FaultyRow,
+    bad_row,
+    marks_for_missing,
+    note_left_out,
+    refuse_other_columns,
+    row_fault,
+)
+from bushfit.reading.roles import of_motion
+from bushfit.reading.source import LARGEST_VALUE, Channels, RowSource, Sheet, Text, cells_of
 from bushfit.reading.times import clock
 
-#: Smallest ratio of nines that mark a missing value to the largest other number; chosen: outliers are rarely nines.
-_MARK_RATIO = 3.0
+#: Number of first rows that are examined; chosen: a long record need not be read completely.
+_FIRST = 1000
+#: Largest number of rows of texts between the units and the first numbers.
+_MOST_TEXT_ROWS = 8
+#: Number of first rows that show whether a file is a table of numbers.
+_FEW_ROWS = 4
 #: Quantity in a line above a table: "1 V = 200 N", "Crosshead speed: 10 mm/min".
 _QUANTITY = re.compile(r"[=:]\s*(\d+(?:[.,]\d+)?)\s*([^\s\d,;]+(?:\s*/\s*[^\s\d,;]+)?)")
 #: Mark of a footnote in a header, such as "Amplitude¹ [mm]".
@@ -37,20 +52,197 @@ _LONGEST_QUOTE = 100
 #: Rows that are converted at a time if pandas cannot read them; chosen: their texts take a few MiB.
 _CHUNK_ROWS = 1 << 16
 
+#: Line number and cells of a row of a table.
+Row = tuple[int, Sequence[str | float]]
+
 
 @dataclass(frozen=True, eq=False)
-class Table(Cells):
-    """Table of a test whose columns have roles, such as "force", and can be read in SI.
+class Table:
+    """Table of a test in its file, whose columns have roles, such as "force".
 
     Args:
+        opened: test file, with its format as the user states it.
+        source: part of the file that contains the table.
+        layout: location of the table, with its headers, units row and delimiter.
         names: usual column names by role, before adaptation to the motion.
         motion: kind of motion: translation, rotation or strain.
+        roles: recognised columns, by role such as "force".
         notes: sentences on columns that were recognised only by their unit.
+        selected: positions of the rows of the test among those of `all_rows`, from 0; None for all.
+        needed: indices of columns that must contain a number; a row without one is not a row of data.
+        clocks: indices of columns that contain times as texts, such as 20:07:10.
+        marks: cells that mark a missing value, such as -9999, by index of their column; all copies of a table share it.
     """
 
-    names: Mapping[str, Sequence[str]]
-    motion: Motion
+    opened: OpenedFile
+    source: RowSource
+    layout: Layout
+    names: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    motion: Motion = TRANSLATION
+    roles: Mapping[str, Column] = field(default_factory=dict, kw_only=True)
     notes: tuple[str, ...] = field(default=(), kw_only=True)
+    selected: frozenset[int] | None = field(default=None, kw_only=True)
+    needed: frozenset[int] = field(default=frozenset(), kw_only=True)
+    clocks: frozenset[int] = field(default=frozenset(), kw_only=True)
+    marks: dict[int, set[str | float]] = field(default_factory=dict, kw_only=True)
+
+    @cached_property
+    def numerals(self) -> Numerals:
+        """Notation of the numbers in the columns whose quantity is known."""
+        return find_numerals(self)
+
+    @cached_property
+    def first_decimal(self) -> str | None:
+        """Decimal mark of the first thousand numbers; None if they leave it open."""
+        return find_first_decimal(self)
+
+    @property
+    def file(self) -> Path:
+        """Path of the test file."""
+        return self.opened.file
+
+    @property
+    def headers(self) -> tuple[str, ...]:
+        """Texts of the header cells of the table."""
+        return self.layout.headers
+
+    def blocks(self) -> Iterator[RowSource]:
+        """Yield the rows of the table in blocks to be read one by one; a single block for selected rows."""
+        if isinstance(self.source, Text) and self.selected is None:
+            return self.source.blocks(self.layout.lines_before_data)
+        return iter([self.source])
+
+    def rows(self, block: RowSource | None = None, left_out: list[FaultyRow] | None = None) -> Iterator[Row]:
+        """Yield the line number and the cells of each row of data; other rows, such as remarks and means, are left out.
+
+        Args:
+            block: block of the source; default the whole source.
+            left_out: list to which the other rows are added.
+
+        Raises:
+            MeasurementError: a line or a quoted cell is far too long.
+        """
+        for position, (line, cells, fault) in enumerate(self.all_rows(block)):
+            if fault is not None and left_out is not None:
+                left_out.append((line, cells, fault))
+            if fault is None and (self.selected is None or position in self.selected):
+                yield line, cells
+
+    @cached_property
+    def first_row(self) -> Sequence[str | float]:
+        """Cells of the first row of data in the table, with numbers if there is one; empty cells without rows."""
+        rows = [cells for _, cells in islice(self.rows(), _MOST_TEXT_ROWS)] or [[""] * len(self.headers)]
+        return next((row for row in rows if is_row(list(map(str, row)))), rows[0])
+
+    @cached_property
+    def first_rows(self) -> list[Sequence[str | float]]:
+        """Cells of each of the first thousand rows of data; one row of empty cells if there are none."""
+        return [cells for _, cells in islice(self.rows(), _FIRST)] or [[""] * len(self.headers)]
+
+    def all_rows(self, block: RowSource | None = None) -> Iterator[tuple[int, Sequence[str | float], str | None]]:
+        """Yield line number, cells and fault of each non-empty row below the header, whether it is data or not.
+
+        Args:
+            block: block of the source; default the whole source.
+
+        Yields:
+            Line number, cells, and the reason why the row is not data (see `row_fault`); None for a row of data.
+        """
+        try:
+            for line in (block or self.source).lines(self.layout.lines_before_data):
+                if self.layout.numbered or not is_comment(line.content, self.layout.delimiter):
+                    cells = cells_of(line, self.layout.delimiter)
+                    if any(cell != "" for cell in cells):
+                        cells = [*cells, *[""] * (len(self.headers) - len(cells))]
+                        yield line.number, cells, row_fault(self, cells)
+        except csv.Error as error:
+            raise self.error("the table cannot be read", found=str(error)) from error
+
+    def parse(self, block: RowSource, indices: frozenset[int]) -> Mapping[int, Floats] | None:
+        """Read columns of a block at once, in units of the file.
+
+        Args:
+            block: block of the source.
+            indices: indices of the columns.
+
+        Returns:
+            Numbers by column index, (n,) each; None if the block has to be read row by row, because it has rows without
+            data or numbers in another notation.
+
+        Notes:
+            All columns that begin with a number are parsed as numbers: a summary row such as "Mean" then fails, as it
+            must. Texts in front of these columns are searched for such words.
+        """
+        if self.selected is not None or not indices.isdisjoint((*self.clocks, *self.marks)):
+            return None
+        if isinstance(block, Channels) and block.numeric >= indices:
+            return {index: block.arrays[index] for index in indices}
+        first = list(map(str, self.first_row))
+        if not isinstance(block, Text) or not indices or len(first) != len(self.headers):
+            return None
+        if self.first_decimal is None:
+            return None
+        notation = Numerals(self.first_decimal)
+        numeric = [index for index, cell in enumerate(first) if notation.allows(cell)]
+        if not indices <= {*numeric}:
+            return None  # pandas takes TRUE for 1
+        frame = block.frame(self.layout, dict.fromkeys(numeric, float), len(first), notation.decimal)
+        words = block.first_words(self.layout.delimiter) if numeric[0] else ()
+        if frame is None or any(is_summary_row([word]) for word in words):
+            return None
+        return {index: frame[index].to_numpy() for index in indices}
+
+    def holds_numbers(self, index: int) -> bool:
+        """Return True if the column with this index has a number in the first row of data."""
+        cell = self.first_row[index]
+        return not isinstance(cell, str) or is_like_number(cell)
+
+    def error(
+        self,
+        problem: str,
+        *,
+        line: int | None = None,
+        column: Column | None = None,
+        kind: type[MeasurementError] = MeasurementError,
+        **details: Any,
+    ) -> MeasurementError:
+        """Return an error that names the file and the location in it.
+
+        Args:
+            problem: description of the problem in one clause.
+            line: line number; None if the problem is not on one line.
+            column: column of the cell; None if the problem is not in one column.
+            kind: class of the error.
+            details: texts for `found`, `expected` and `hint` of the error.
+        """
+        return kind(problem, file=self.file, place=self.place(line, column), **details)
+
+    def header_error(self, problem: str, found: str | None = None, **details: Any) -> MeasurementError:
+        """Return an error for the header line; if the file is a table, `found` is by default the header cells."""
+        if found is None and self.is_table:
+            found = ", ".join(self.headers)
+        found = found or f"{len(self.headers)} cell{'s' * (len(self.headers) != 1)}, without the name of a column"
+        return self.error(problem, line=self.layout.header_line, found=found, **details)
+
+    @property
+    def is_table(self) -> bool:
+        """True if the file is a table of numbers; errors do not quote the text of any other file."""
+        return len(self.roles) > 1 or any(is_row(list(map(str, cells))) for _, cells in islice(self.rows(), _FEW_ROWS))
+
+    def place(self, line: int | None, column: Column | None) -> str | None:
+        """Return the location in the file for an error, such as "line 3, column "Time [s]""; None if nothing is known.
+
+        Args:
+            line: line number; None if the problem is not on one line.
+            column: column of the cell; None if the problem is not in one column.
+        """
+        source = self.source
+        parts = [
+            f'{word_for_part(self.file)} "{source.sheet}"' if source.sheet else None,
+            f"{'row' if source.sheet or isinstance(source, Channels) else 'line'} {line}" if line else None,
+            f'column "{column.header}"' if column else None,
+        ]
+        return ", ".join(part for part in parts if part) or None
 
     @cached_property
     def lines_above(self) -> list[Line]:
@@ -120,130 +312,10 @@ class Table(Cells):
         """Columns that state direction, specimen_number and run of each row: index and texts, (n,), by these keys."""
         return find_labels(self)
 
-    def column(self, role: str, tested: Place, hint: str | None = None) -> Column:
-        """Return the column of a role with its factor to SI, after checking its unit; a ratio needs no unit.
-
-        Args:
-            role: role of the column, such as "force".
-            tested: direction of the bushing, or the specimen; it determines the unit.
-            hint: next step to suggest if there is no such column.
-
-        Returns:
-            Column whose `scale` converts its numbers to SI.
-
-        Raises:
-            MeasurementError: there is no such column.
-            UnitError: the unit is missing, unknown, or of another dimension.
-        """
-        label, expected = role.replace("_", " "), si_unit(role, tested.motion)
-        quantity, example = units.common_unit(expected)
-        if role not in self.roles:
-            self.refuse_other_motion(role)
-            ways = ", ".join(filter(None, (self.columns_key(role, expected), hint)))
-            raise self.header_error(
-                f"there is no column for the {label}",
-                expected=f'a header such as "{label} [{example}]"',
-                hint=f"name the column in the campaign: {ways}",
-            )
-        column = self.roles[role]
-        if column.index in self.clocks:
-            return column
-        place = self.place(self.layout.header_line, column)
-        unclear = partial(UnitError, file=self.file, place=place, found=f'"{column.header}"')
-        if math.isnan(column.logarithm):
-            unit = column.unit or example
-            raise unclear(
-                f"the base of the logarithm of the {label} is not known",
-                expected="log10 or ln in the header",
-                hint=f'units = {{ {role} = "log10({unit})" }} in the campaign, or units = {{ {role} = "ln({unit})" }}',
-            )
-        if column.unit is None and column.logarithm:
-            raise unclear(
-                f"the logarithms of the {label} have no unit",
-                expected="the reference, such as dB re 1 N/mm, or the unit, such as log10(N/mm)",
-                hint=f'units = {{ {role} = "{example}" }} in the campaign if the logarithm of 1 {example} is 0',
-            )
-        if column.unit is None and (expected != "1" or role in OF_MOTION):
-            angular = expected == "Hz" and is_angular(column.header, "1/s")
-            second = "rad/s" if angular else {"phase": "rad", "time": "ms"}.get(role, "")
-            alternative = f', or units = {{ {role} = "{second}" }}' if second else ""
-            raise unclear(
-                f"the {label} has no unit",
-                expected=f"{quantity}, such as {example}{', or an angular frequency, such as rad/s' * angular}",
-                hint=f'write "{column.header} [{"rad/s" if angular else example}]" in the header, '
-                f'or units = {{ {role} = "{self.quantity_above(expected) or example}" }} in the campaign{alternative}',
-            )
-        unit = column.unit or "1"
-        foreign_units = ("m", "rad", "N/m", "N*m/rad") if self.motion is STRAINING else ("1", "Pa")
-        is_foreign = any(units.is_compatible(unit, foreign_unit) for foreign_unit in foreign_units)
-        if is_foreign and role in OF_MOTION and "force" not in role:
-            self.refuse_other_motion(role, [column.header])
-        if not units.is_compatible(unit, expected) and units.is_compatible(unit, "V"):  # pint is slow to import
-            raise unclear(
-                f"the {label} is in volts",
-                expected=f"{quantity}, such as {example}",
-                hint=f"state the {label} of one volt, such as units = "
-                f'{{ {role} = "{self.quantity_above(expected) or f"200 {example}"}" }} in the campaign',
-            )
-        if role == "amplitude" and units.is_compatible(unit, "m/s^2") and expected == "m":
-            return replace(column, role="acceleration", scale=units.si_factor(unit, "m/s^2"))
-        with error_location(self.file, place):
-            if expected == "Hz" and is_angular(column.header, unit):
-                per_second = "rad/s" if units.is_compatible(unit, "rad/s") else "Hz"
-                return replace(column, scale=units.si_factor(unit, per_second) / (2.0 * math.pi))
-            is_strain = role in ("displacement", "amplitude", "amplitude_reached")
-            strain_factor = strain_factor_of_files(tested) if is_strain else 1.0
-            return replace(column, scale=strain_factor * units.si_factor(unit, expected))
-
     def agrees(self, role: str, expected: str) -> bool:
         """True if there is a column for a role such as "force", whose unit has the dimension of the unit `expected`."""
         column = self.roles.get(role)
         return column is not None and units.is_compatible(column.unit or "1", expected)
-
-    def columns_key(self, role: str, unit: str) -> str:
-        """Suggest campaign keys for a missing column, such as 'columns = { force = "F1" }', for the hint of an error.
-
-        Args:
-            role: role of the missing column, such as "force".
-            unit: its SI unit.
-
-        Returns:
-            Keys for up to three unused headers with a unit of this dimension.
-        """
-        usual = Vocabulary({**LOOP_COLUMNS, **SWEEP_COLUMNS})
-        fitting = [
-            header
-            for header, in_row in zip(self.headers, self.layout.units, strict=True)
-            if header
-            and (not (heading := usual.heading(header)) or (role, heading.role) == ("amplitude", "displacement"))
-            and unit != "1"
-            and units.is_compatible(split_unit(header)[1] or parse_unit(in_row)[0], unit)
-        ]
-        return " or ".join(f'columns = {{ {role} = "{header}" }}' for header in fitting[:3] or ["..."])
-
-    def refuse_other_motion(self, role: str, headers: Sequence[str] | None = None) -> None:
-        """Refuse strain or modulus columns in a test of displacement and force, or the reverse.
-
-        Args:
-            role: role of the column that the test lacks, such as "amplitude".
-            headers: headers known to belong to the other kind of test; by default those of the table are checked.
-
-        Raises:
-            MeasurementError: a header has this role in the other kind of test.
-        """
-        other_motion = TRANSLATION if self.motion is STRAINING else STRAINING
-        kinds = ["displacement and force or stiffness", "strain and modulus"]
-        expected, found = kinds[:: -1 if self.motion is STRAINING else 1]
-        hint = 'write [[specimens]] with a name and kind = "modulus" in the campaign, and specimen = "its name" here'
-        if self.motion is STRAINING:
-            hint = 'take specimen out of the campaign, or give it kind = "shear" with its area and thickness'
-        names = of_motion(self.names, other_motion)
-        differs = role in names and names[role] is not of_motion(self.names, self.motion)[role]
-        words = Vocabulary({role: names[role]} if differs else {}, {})
-        for header in headers or filter(words.heading, self.headers):
-            label = role.replace("_", " ")
-            problem = f"this is a test of {found}"
-            raise self.header_error(problem, found=f'"{header}" for the {label}', expected=expected, hint=hint)
 
     def read(self, wanted: Mapping[str, Column], *, fewest_rows: int) -> tuple[dict[str, Floats], tuple[str, ...]]:
         """Read columns, and list the rows that are left out.
@@ -264,15 +336,16 @@ class Table(Cells):
         if left_out:
             refuse_other_columns(table, left_out, Vocabulary(of_motion(self.names, self.motion)))
         values = {role: np.concatenate([np.empty(0), *(part.pop(role) for part in parts)]) for role in wanted}
-        if marks := table._marks_for_missing(wanted, values):
-            self.marks.update(marks)
+        if marks := marks_for_missing(table, wanted, values):
+            for index, cell in marks.items():
+                self.marks.setdefault(index, set()).add(cell)
             return self.read(wanted, fewest_rows=fewest_rows)
         count = len(next(iter(values.values())))
-        notes = (*self.notes, *self.remarks, *table.note_left_out(left_out, count))
+        notes = (*self.notes, *self.remarks, *note_left_out(table, left_out, count))
         if count < fewest_rows:
             faulty = ((line, cells) for line, cells, fault in left_out if fault in ("doubtful", "missing"))
             if row := next(faulty, None):
-                raise table.bad_row(*row)
+                raise bad_row(table, *row)
             problem, hint = "too few rows", None
             if isinstance(self.source, Sheet) and self.source.lacks_values():
                 problem = "the workbook has formulas whose values were not saved"
@@ -284,49 +357,9 @@ class Table(Cells):
                     values[role] = column.scale * column.logarithm ** (values[role] / column.scale)
         return values, notes
 
-    def _marks_for_missing(self, wanted: Mapping[str, Column], values: Mapping[str, Floats]) -> dict[int, str | float]:
-        """Find numbers that mark missing values: nines beyond all others, or -1 beside positive numbers.
-
-        Args:
-            wanted: columns by role, with their factors to SI.
-            values: values in SI by role, (n,) each.
-
-        Returns:
-            Cell with such a number, as in the file, by index of its column.
-        """
-        marks: dict[int, str | float] = {}
-        for role, column in ((role, column) for role, column in wanted.items() if role != "time"):
-            for row in {int(values[role].argmin()), int(values[role].argmax())} if values[role].size else ():
-                number = float(values[role][row] / column.scale)
-                if number != -1.0 and (abs(number) < 99.0 or not set(f"{abs(number):.9g}") <= set("9.")):
-                    continue
-                rest = values[role][values[role] != values[role][row]] / column.scale
-                is_apart = abs(number) > _MARK_RATIO * np.abs(rest).max(initial=0.0)
-                if rest.size > values[role].size / 2 and (rest.min() > 0.0 if number == -1.0 else is_apart):
-                    marks[column.index] = next(islice(self.rows(), row, None))[1][column.index]
-        return marks
-
     def needing(self, wanted: Mapping[str, Column]) -> "Table":
         """Copy of the table in which only rows with a number in each wanted column are data."""
         return replace(self, needed=self.needed | {column.index for column in wanted.values()})
-
-    def check_positive(self, roles: Sequence[str], wanted: Mapping[str, Column], values: Mapping[str, Floats]) -> None:
-        """Refuse values that are not positive, or positive but smaller than any rig records.
-
-        Args:
-            roles: roles such as "frequency" whose values must be positive, if they are among `values`.
-            wanted: columns by role.
-            values: values in SI by role, (n,) each.
-
-        Raises:
-            MeasurementError: a value is not positive or too small.
-        """
-        for role in roles:
-            if role in values:
-                problem = f"the {role.replace('_', ' ')} is not positive"
-                self.refuse(values[role] <= 0.0, wanted[role], problem, "a number above zero")
-                smallest = f"{LEAST_VALUE / abs(wanted[role].scale):.3g} or more"
-                self.refuse(values[role] < LEAST_VALUE, wanted[role], "no rig records values this small", smallest)
 
     def refuse(
         self, bad: NDArray[np.bool_], column: Column, problem: str, expected: str, hint: str | None = None
@@ -380,5 +413,5 @@ class Table(Cells):
         cell, value_of = cells[column.index], clock if column.index in self.clocks else self.numerals.value
         value = value_of(cell) if isinstance(cell, str) else cell
         if value is None or not abs(value * column.scale) <= LARGEST_VALUE:
-            raise self.bad_row(line, cells, column=column)
+            raise bad_row(self, line, cells, column=column)
         return value * column.scale

@@ -16,6 +16,7 @@ from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import Floats, Loop, Sweep
+from bushfit.reading.si_columns import si_column
 from bushfit.reading.stated import LoopFile, SweepFile
 from bushfit.reading.sweeps import read_sweep
 
@@ -111,7 +112,7 @@ def test_what_can_be_read_in_two_ways_is_refused(case, tmp_path):
     file = tmp_path / "loop.csv"
     file.write_text("\n".join(["time [s];displacement [mm];force [N]", cells, *rows]))
     table = find_table(file, LOOP_COLUMNS, file_format=FileFormat(**stated))  # type: ignore[arg-type]
-    wanted = {"force": table.column("force", Direction.AXIAL)}
+    wanted = {"force": si_column(table, "force", Direction.AXIAL)}
     if force is None:
         with pytest.raises(MeasurementError, match=r"two ways[\s\S]*decimal = "):
             table.read(wanted, fewest_rows=1)

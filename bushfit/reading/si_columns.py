@@ -1,0 +1,141 @@
+"""Columns of a table with their factors to SI, and the questions that a missing column or unit raises."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING
+
+from bushfit import units
+from bushfit.errors import UnitError, error_location
+from bushfit.geometry import STRAINING, TRANSLATION, Place, strain_factor_of_files
+from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS, Column, Vocabulary, is_angular, parse_unit, split_unit
+from bushfit.reading.roles import OF_MOTION, of_motion, si_unit
+
+if TYPE_CHECKING:
+    from bushfit.reading.table import Table
+
+
+def si_column(table: Table, role: str, tested: Place, hint: str | None = None) -> Column:
+    """Return the column of a role with its factor to SI, after checking its unit; a ratio needs no unit.
+
+    Args:
+        role: role of the column, such as "force".
+        tested: direction of the bushing, or the specimen; it determines the unit.
+        hint: next step to suggest if there is no such column.
+
+    Returns:
+        Column whose `scale` converts its numbers to SI.
+
+    Raises:
+        MeasurementError: there is no such column.
+        UnitError: the unit is missing, unknown, or of another dimension.
+    """
+    label, expected = role.replace("_", " "), si_unit(role, tested.motion)
+    quantity, example = units.common_unit(expected)
+    if role not in table.roles:
+        refuse_other_motion(table, role)
+        ways = ", ".join(filter(None, (columns_key(table, role, expected), hint)))
+        raise table.header_error(
+            f"there is no column for the {label}",
+            expected=f'a header such as "{label} [{example}]"',
+            hint=f"name the column in the campaign: {ways}",
+        )
+    column = table.roles[role]
+    if column.index in table.clocks:
+        return column
+    place = table.place(table.layout.header_line, column)
+    unclear = partial(UnitError, file=table.file, place=place, found=f'"{column.header}"')
+    if math.isnan(column.logarithm):
+        unit = column.unit or example
+        raise unclear(
+            f"the base of the logarithm of the {label} is not known",
+            expected="log10 or ln in the header",
+            hint=f'units = {{ {role} = "log10({unit})" }} in the campaign, or units = {{ {role} = "ln({unit})" }}',
+        )
+    if column.unit is None and column.logarithm:
+        raise unclear(
+            f"the logarithms of the {label} have no unit",
+            expected="the reference, such as dB re 1 N/mm, or the unit, such as log10(N/mm)",
+            hint=f'units = {{ {role} = "{example}" }} in the campaign if the logarithm of 1 {example} is 0',
+        )
+    if column.unit is None and (expected != "1" or role in OF_MOTION):
+        angular = expected == "Hz" and is_angular(column.header, "1/s")
+        second = "rad/s" if angular else {"phase": "rad", "time": "ms"}.get(role, "")
+        alternative = f', or units = {{ {role} = "{second}" }}' if second else ""
+        raise unclear(
+            f"the {label} has no unit",
+            expected=f"{quantity}, such as {example}{', or an angular frequency, such as rad/s' * angular}",
+            hint=f'write "{column.header} [{"rad/s" if angular else example}]" in the header, '
+            f'or units = {{ {role} = "{table.quantity_above(expected) or example}" }} in the campaign{alternative}',
+        )
+    unit = column.unit or "1"
+    foreign_units = ("m", "rad", "N/m", "N*m/rad") if table.motion is STRAINING else ("1", "Pa")
+    is_foreign = any(units.is_compatible(unit, foreign_unit) for foreign_unit in foreign_units)
+    if is_foreign and role in OF_MOTION and "force" not in role:
+        refuse_other_motion(table, role, [column.header])
+    if not units.is_compatible(unit, expected) and units.is_compatible(unit, "V"):  # pint is slow to import
+        raise unclear(
+            f"the {label} is in volts",
+            expected=f"{quantity}, such as {example}",
+            hint=f"state the {label} of one volt, such as units = "
+            f'{{ {role} = "{table.quantity_above(expected) or f"200 {example}"}" }} in the campaign',
+        )
+    if role == "amplitude" and units.is_compatible(unit, "m/s^2") and expected == "m":
+        return replace(column, role="acceleration", scale=units.si_factor(unit, "m/s^2"))
+    with error_location(table.file, place):
+        if expected == "Hz" and is_angular(column.header, unit):
+            per_second = "rad/s" if units.is_compatible(unit, "rad/s") else "Hz"
+            return replace(column, scale=units.si_factor(unit, per_second) / (2.0 * math.pi))
+        is_strain = role in ("displacement", "amplitude", "amplitude_reached")
+        strain_factor = strain_factor_of_files(tested) if is_strain else 1.0
+        return replace(column, scale=strain_factor * units.si_factor(unit, expected))
+
+
+def columns_key(table: Table, role: str, unit: str) -> str:
+    """Suggest campaign keys for a missing column, such as 'columns = { force = "F1" }', for the hint of an error.
+
+    Args:
+        role: role of the missing column, such as "force".
+        unit: its SI unit.
+
+    Returns:
+        Keys for up to three unused headers with a unit of this dimension.
+    """
+    usual = Vocabulary({**LOOP_COLUMNS, **SWEEP_COLUMNS})
+    fitting = [
+        header
+        for header, in_row in zip(table.headers, table.layout.units, strict=True)
+        if header
+        and (not (heading := usual.heading(header)) or (role, heading.role) == ("amplitude", "displacement"))
+        and unit != "1"
+        and units.is_compatible(split_unit(header)[1] or parse_unit(in_row)[0], unit)
+    ]
+    return " or ".join(f'columns = {{ {role} = "{header}" }}' for header in fitting[:3] or ["..."])
+
+
+def refuse_other_motion(table: Table, role: str, headers: Sequence[str] | None = None) -> None:
+    """Refuse strain or modulus columns in a test of displacement and force, or the reverse.
+
+    Args:
+        role: role of the column that the test lacks, such as "amplitude".
+        headers: headers known to belong to the other kind of test; by default those of the table are checked.
+
+    Raises:
+        MeasurementError: a header has this role in the other kind of test.
+    """
+    other_motion = TRANSLATION if table.motion is STRAINING else STRAINING
+    kinds = ["displacement and force or stiffness", "strain and modulus"]
+    expected, found = kinds[:: -1 if table.motion is STRAINING else 1]
+    hint = 'write [[specimens]] with a name and kind = "modulus" in the campaign, and specimen = "its name" here'
+    if table.motion is STRAINING:
+        hint = 'take specimen out of the campaign, or give it kind = "shear" with its area and thickness'
+    names = of_motion(table.names, other_motion)
+    differs = role in names and names[role] is not of_motion(table.names, table.motion)[role]
+    words = Vocabulary({role: names[role]} if differs else {}, {})
+    for header in headers or filter(words.heading, table.headers):
+        label = role.replace("_", " ")
+        problem = f"this is a test of {found}"
+        raise table.header_error(problem, found=f'"{header}" for the {label}', expected=expected, hint=hint)
