@@ -42,6 +42,8 @@ _STIFFNESS_AGREEMENT = 0.1
 _MULTIPLE = re.compile(r"^(?=[\d.]*[1-9])\d+\.?\d*(?=\s+[^\W\d_])")
 #: Roles that are ignored, without an error, if two different columns have them: other columns can replace them.
 _REPLACEABLE = ("force_amplitude", "damping_coefficient", "damping_ratio", "relative_error", "temperature")
+#: Symbols of a displacement.
+_SYMBOLS = ("x", "u", "s", "w")
 #: Roles that state the loss of a sweep.
 _LOSSES = {"phase", "loss_factor", "loss_stiffness", "damping_coefficient", "damping_ratio"}
 #: Words in a header that mark a set point or mean, a part of a complex number, or an amplitude; by these kinds.
@@ -52,7 +54,7 @@ _STRAINS = [name for name in map(plain, WORDS["straining"]["displacement"]) if l
 _BY_UNIT: dict[str, str | None] = {
     **dict.fromkeys(("time", "displacement", "force")),
     **{"storage_stiffness": "real", "loss_stiffness": "imaginary", "stiffness": None, "force_amplitude": "amplitude"},
-    **{"frequency": None, "amplitude": "amplitude", "phase": None},
+    **{"frequency": None, "amplitude": "amplitude", "phase": None, "damping_coefficient": None},
 }
 
 
@@ -264,12 +266,13 @@ def _add_by_unit(table: Table, roles: dict[str, Column]) -> tuple[list[str], lis
     notes, amplitude = [], _QUALIFIERS["amplitude"]
     motions = (STRAINING,) if motion is STRAINING else (TRANSLATION, ROTATION)
     for role, qualifier in _BY_UNIT.items():
-        if role in roles or role not in names or (role == "phase" and _LOSSES & set(roles)):
+        if role in roles or role not in names or (role in ("phase", "damping_coefficient") and _LOSSES & set(roles)):
             continue
-        is_beside_stiffness = role in ("frequency", "amplitude", "phase")
+        is_beside_stiffness = role in ("frequency", "amplitude", "phase", "damping_coefficient")
         if is_beside_stiffness and not {"stiffness", "storage_stiffness", "force_amplitude", "compliance"} & set(roles):
             continue
-        if motion is STRAINING and (role == "force_amplitude" or not (qualifier or is_beside_stiffness)):
+        is_certain = qualifier or is_beside_stiffness
+        if motion is STRAINING and (role in ("force_amplitude", "damping_coefficient") or not is_certain):
             continue  # a ratio or a pressure may be any quantity
         expected = {si_unit(role, kind) for kind in motions} | ({"rad/s"} if role == "frequency" else set())
         fitting = [
@@ -307,7 +310,8 @@ def _moves_along(table: Table, first: Column, second: Column) -> bool:
 def _add_motion_as_amplitude(table: Table, roles: dict[str, Column], stated_units: Mapping[str, str]) -> list[str]:
     """Use a column that is named like a displacement as the amplitude of a sweep, and add it to the known columns.
 
-    The table must have a force amplitude; a stiffness, if there is one, must agree with force over displacement.
+    The table must have a force amplitude, or the name must be a symbol, such as x. A stiffness, if there is one, must
+    agree with force over displacement.
 
     Args:
         table: header and rows of the table.
@@ -317,16 +321,17 @@ def _add_motion_as_amplitude(table: Table, roles: dict[str, Column], stated_unit
     Returns:
         A sentence on the added column; empty without one.
     """
-    motions = Vocabulary({"amplitude": [*LOOP_COLUMNS["displacement"], "x", "u", "s", "w"]}, {})
+    motions = Vocabulary({"amplitude": [*LOOP_COLUMNS["displacement"], *_SYMBOLS]}, {})
     candidates = [
         _column_of(table, heading, index, stated_units.get("amplitude"))
         for index, header in enumerate(table.headers)
         if header and (heading := motions.heading(header)) and not heading.logarithm
     ]
     fitting = [c for c in candidates if any(units.is_compatible(c.unit or "", si) for si in ("m", "rad"))]
-    if len(fitting) != 1 or "force_amplitude" not in roles:
+    has_force = "force_amplitude" in roles
+    if len(fitting) != 1 or not (has_force or _name(fitting[0].header) in _SYMBOLS):
         return []
-    if "stiffness" in roles:
+    if has_force and "stiffness" in roles:
         columns = (fitting[0], roles["force_amplitude"], roles["stiffness"])
         motion = ROTATION if units.is_compatible(fitting[0].unit or "", "rad") else TRANSLATION
         expected = [(column.unit or "", si_unit(column.role, motion)) for column in columns]
@@ -336,4 +341,5 @@ def _add_motion_as_amplitude(table: Table, roles: dict[str, Column], stated_unit
         if x.size == 0 or not np.all(np.abs(stiffness * x - force) <= _STIFFNESS_AGREEMENT * force):
             return []
     roles["amplitude"] = fitting[0]
-    return [f'"{fitting[0].header}" is read as the amplitude, because the file has the amplitude of the force, too']
+    reason = "because the file has the amplitude of the force, too" if has_force else "by its unit"
+    return [f'"{fitting[0].header}" is read as the amplitude, {reason}']

@@ -137,6 +137,8 @@ _SPELLINGS: dict[int, int | str] = {
 }
 #: End of a name before a unit without brackets: "force_N", "Kraft in N", "F / kN", "load, N".
 _NAME_END = re.compile(r"\s+in\s+|\s*/\s*|\s*,\s*|\s+|_")
+#: Newton per a length in a name without capitals: "n_per_mm"; and the word before a part of such a unit.
+_PER_OF_NEWTON, _PER = re.compile(r"\bn per "), re.compile(r"(?<![^\W_])per$")
 
 
 @dataclass(frozen=True)
@@ -347,7 +349,9 @@ def _splits(text: str) -> Iterator[tuple[str, str | None, bool]]:
     yield name, unit, True
     if unit is None:
         for end in reversed(list(_NAME_END.finditer(name))):
-            text = name[end.end() :].replace("_", " ")
+            text = _PER_OF_NEWTON.sub("N/", name[end.end() :].replace("_", " "))
+            if _PER.search(name[: end.start()]):
+                continue  # a part of a unit such as N_per_mm
             if not (text.startswith("dyn") or units.is_number(text)):  # dynamic, and no dyne; the first of several
                 yield name[: end.start()], text, False
 

@@ -243,10 +243,10 @@ def _below(lines: Sequence[Line], header: int, delimiter: str) -> Iterator[Line]
 
 
 def is_row(cells: Sequence[str]) -> bool:
-    """Return True if at least two cells, and at least half of the non-empty cells, are numbers."""
+    """Return True if half of the non-empty cells, and at least two, are numbers, and no "name:" comes first."""
     filled = [cell for cell in cells[:_MOST_COLUMNS] if cell]
     numbers = sum(map(is_like_number, filled))
-    return numbers > 1 and 2 * numbers >= len(filled)
+    return numbers > 1 and 2 * numbers >= len(filled) and not filled[0].endswith(":")
 
 
 def _first_rows(lines: Sequence[Line], delimiters: Sequence[str]) -> tuple[int, Sequence[str]]:

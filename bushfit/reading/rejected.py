@@ -51,7 +51,7 @@ def row_fault(table: Table, cells: Sequence[str | float]) -> str | None:
         but cannot be read; None for a row of data.
     """
     texts = [str(cell) for cell in cells]
-    if is_summary_row(texts):
+    if is_summary_row(texts) or next(filter(None, texts), "").endswith(":"):
         return "other"
     if any(texts[len(table.headers) :]):
         return "doubtful" if is_row(texts) else "other"
@@ -67,6 +67,8 @@ def row_fault(table: Table, cells: Sequence[str | float]) -> str | None:
                 return "other"
             if not any(is_like_number(texts[number]) for number in table.needed):
                 return "other"
+            if is_like_number(texts[index].rstrip("*!?#")):
+                return "missing"  # a number that is marked as faulty
             word = texts[index].lower().strip("#*!?-./ ")
             is_word = texts[index] and not any(sign.isdigit() for sign in word)
             return "doubtful" if not is_word else "missing" if word in _MISSING else "word"

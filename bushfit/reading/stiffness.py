@@ -6,6 +6,7 @@ from collections.abc import Collection, Mapping
 
 import numpy as np
 
+from bushfit import units
 from bushfit.reading.headers import WORDS, Column, Vocabulary
 from bushfit.reading.measurement import Complex, Floats
 from bushfit.reading.roles import AGREEING_PAIRS, OF_MOTION, PAIRS
@@ -30,7 +31,7 @@ _WAYS_ON = {
 }
 _DERIVED = Vocabulary(WORDS["derived"])
 #: Names of a damping that can be a loss factor or a damping ratio.
-_DAMPING = Vocabulary({"damping": ["damping", "damp", "Dämpfung", "amortissement", "amortiguamiento", "阻尼"]})
+_DAMPING = Vocabulary({"damping": ["damping", "damp", "Dämpfung", "amortissement", "amortiguamiento", "阻尼", "D"]})
 
 
 def stiffness_pair(table: Table) -> tuple[str, str]:
@@ -69,7 +70,8 @@ def refuse_ambiguous_damping(table: Table) -> None:
     Raises:
         MeasurementError: the table has an ambiguous damping.
     """
-    damping = next((header for header in table.headers if header and _DAMPING.heading(header)), None)
+    headings = ((header, _DAMPING.heading(header)) for header in table.headers if header)
+    damping = next((header for header, one in headings if one and units.is_compatible(one.unit or "1", "1")), None)
     if damping and {"stiffness", "storage_stiffness", "force_amplitude"} & set(table.roles):
         keys = (f'columns = {{ {role} = "{damping}" }}' for role in ("loss_factor", "damping_ratio"))
         coefficient = f'columns = {{ damping_coefficient = "{damping}" }}'

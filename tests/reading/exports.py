@@ -65,6 +65,7 @@ EXPORTS: dict[str, Export] = {
             ("Amplitude RMS [mm]", 0.5**0.5), ("Amplitude eff. [mm]", 0.5**0.5), ("Amp [mm rms]", 0.5**0.5),
             ("AmpPkPk(mm)", 2.0), ("DA [mm]", 2.0), ("Amplitude (2a) [mm]", 2.0), ("Amplitude max-min [mm]", 2.0),
             ("Amplitude total [mm]", 2.0), ("Double amplitude (mm)", 2.0), ("DispPkPk [mm]", 2.0),
+            ("Ampl. DA (mm)", 2.0), ("Xpp [mm]", 2.0), ("Xrms [mm]", 0.5**0.5), ("x [mm]", 1.0),
             ("Amplitude [±mm]", 1.0), ("Amplitude (mm pk)", 1.0), ("Amplitude peak [mm]", 1.0), ("±Displacement [mm]", 1.0),
         )
     },
@@ -72,6 +73,15 @@ EXPORTS: dict[str, Export] = {
         sweep("Frequency [Hz]|Amplitude [mm]|K* [N/mm]|tan delta", F, 0.5**0.5 * A, K, ETA), stated={"amplitude": "rms"}
     ),
     "damping": Export(sweep(USUAL + "Damping [-]", F, A, K, ETA), None, ["loss_factor", "damping_ratio"]),
+    "D": Export(sweep(USUAL + "D [-]", F, A, K, ETA), None, ["loss_factor", "damping_ratio"]),
+    "d is a damping coefficient by its unit": Export(sweep("f [Hz]|s0 [mm]|c* [N/mm]|d [N s/mm]", F, A, K, DAMPING), words=["by its unit"]),
+    "snake case": Export(sweep("freq_hz|amp_um_pp|kdyn_n_per_mm|loss_angle_deg", F, 2e3 * A, K, PHASE)),
+    "cycle rate": Export(sweep("Cycle rate [cpm]|Amplitude [mm]|K* [N/mm]|tan delta", 60 * F, A, K, ETA)),
+    "a static stiffness": Export(sweep("f [Hz]|A [mm]|Cstat [N/mm]|tan delta", F, A, K, ETA), None, ["understood: frequency, amplitude, loss factor"]),
+    "a size of zero, marked numbers and names of intervals": Export(
+        sweep(USUAL + "tan delta|Point", F, A, K, ETA, 0 * F) + "85\t0.5\t0\t0.1\t0\n90\t0.5\t673.5*\t0.1\t0\nInterval and data:\t2\t5\n",
+        words=["3 rows left out", "(85, 0.5, 0", "(90, 0.5, 673.5*", "(Interval and data:"],
+    ),
     "damping is a loss factor": Export(
         sweep(USUAL + "Damping [-]", F, A, K, ETA), stated={"columns": {"loss_factor": "Damping [-]"}}
     ),
