@@ -29,7 +29,7 @@ from bushfit.diagnosis.priors import DECISIVE_CHI_SQUARE
 from bushfit.diagnosis.rig_errors import in_scatter_units, rig_errors
 from bushfit.effects.contract import Array
 from bushfit.fitting.coordinates import Bounds, Coordinates, coordinate_bounds
-from bushfit.fitting.preparation import MeasuredTest
+from bushfit.fitting.preparation import MeasuredSweep, MeasuredTest, log_slopes
 from bushfit.geometry import STRAINING
 from bushfit.model.covariance import Z95
 from bushfit.model.model import Model
@@ -204,15 +204,14 @@ class Term:
         return shapes / np.abs(shapes * self.unit(model) / self.stiffness(model)).max(axis=-1)[:, None]
 
     def residual(self, value: Array, model: Model) -> Array:
-        """Whitened residuals of a model with an added stiffness, model minus measured in units of noise, (n,).
-
-        Args:
-            value: added stiffness at the operating points, in the unit `measure`, (p,).
-            model: model without the added stiffness.
-        """
+        """Whitened residuals of a model with an added stiffness `value` at the operating points, (n,)."""
         residuals, added = self.evidence.solution.problem.residual(model), value * self.unit(model)
         for test, points in self.tests:
-            residuals[self.evidence.residual_rows[test]] = test.residual(model, added=added[points])
+            rows = self.evidence.residual_rows[test]
+            if isinstance(test, MeasuredSweep):
+                residuals[rows] = test.whiten(test.deviation(test.stiffness(model) + added[points]))
+            else:
+                residuals[rows] += test.residual_change(added[points], model)
         return residuals
 
     def linearised(self, model: Model, value: Array, shapes: Array) -> tuple[Array, Array, Array]:
@@ -235,8 +234,14 @@ class Term:
         for test, points in self.tests:
             columns[:, place[test]] = test.residual_change(changes[:, points], model, added[points])
             residuals[place[test]] -= test.residual_change(added[points], model, added[points])
-            as_share = self.measure == "gain"
-            rows[:, place[test]] = slopes * test.jacobian(model, names, added[points], as_share=as_share)
+            share = added[points] if self.measure == "gain" else 0.0  # which stays proportional to the stiffness
+            if isinstance(test, MeasuredSweep):
+                stiffness, change = test.stiffness_slopes(model, names)
+                change = test.residual_change((1.0 + share / stiffness) * change, model, added[points])
+            else:
+                change = test.residual_change(share * log_slopes(model, test, names), model)
+                change = test.jacobian(model, names) + change
+            rows[:, place[test]] = slopes * change
         return residuals, rows, columns.reshape(2, len(shapes), -1).swapaxes(0, 1)
 
 
@@ -261,21 +266,16 @@ def nearest_power_law(
     plain = replace(plain, chosen_cases=plain.likely_cases(_NEAR))
     terms = [term for measure in _MEASURES if (term := Term(bare, measure)).has_one_meaning]
     settled = (_settled_grid(fitted, term, plain, begun, bounds) for term in terms)
-    grids = [grid for grid in settled if grid]
-    grids.sort(key=lambda grid: -grid.log_evidence)
+    grids = sorted(filter(None, settled), key=lambda grid: -grid.log_evidence)
     if not grids or grids[0].log_evidence < grids[0].linear.evidence.log_evidence:
         return None
     log_ratios = np.array([grid.log_evidence - grids[0].log_evidence for grid in grids])
-    alternatives = tuple(
-        grid.measure
-        for grid, log_ratio in zip(grids[1:], log_ratios[1:], strict=True)
-        if -log_ratio < 0.5 * DECISIVE_CHI_SQUARE
-    )
+    others = zip(grids[1:], -log_ratios[1:], strict=True)
+    alternatives = tuple(grid.measure for grid, loss in others if loss < 0.5 * DECISIVE_CHI_SQUARE)
     counts = np.round(_DRAWS * np.exp(log_ratios)).astype(int).tolist()
     draws = np.concatenate([grid.draws(count) for grid, count in zip(grids, counts, strict=True)], axis=-1)
-    turn = np.exp(1j * draws[0])
-    middle = np.angle(turn.mean())
-    draws[0] = np.degrees(middle + np.angle(turn * np.exp(-1j * middle)))
+    middle = np.angle(np.exp(1j * draws[0]).mean())
+    draws[0] = np.degrees(middle + np.angle(np.exp(1j * (draws[0] - middle))))
     phase, p, q = (tuple(quantiles) for quantiles in np.quantile(draws, (0.5, 0.025, 0.975), axis=-1).T.tolist())
     law = logsumexp(log_ratios) + grids[0].log_evidence - log(len(grids))
     curves = replace(grids[0].linear, groups=plain.groups).group_evidence  # around the same parameters and term
@@ -344,11 +344,11 @@ def _settled_grid(fitted: Evidence, term: Term, plain: LinearModel, model: Model
     Returns:
         The last grid, linearised about the fitted model and power law; None without convergence.
     """
-    changes = np.ptp(term.points, axis=0) > 0.0
     # at first around the measured stiffness, by which a term of any size is linear
     value = np.concatenate([test.measured - test.noise_free(model).measured for test, _ in term.tests])
     value = value / term.unit(model)
-    ends, middle = np.outer((-_LARGEST_POWER, _LARGEST_POWER), changes), np.full(2, np.inf)
+    ends = limits = np.outer((-_LARGEST_POWER, _LARGEST_POWER), np.ptp(term.points, axis=0) > 0.0)
+    middle = np.full(2, np.inf)
     for _ in range(_ROUNDS):
         powers = np.array(list(product(*map(np.unique, np.linspace(ends[0], ends[1], _GRID).T))))
         step = np.ptp(ends, axis=0) / (_GRID - 1)
@@ -362,7 +362,6 @@ def _settled_grid(fitted: Evidence, term: Term, plain: LinearModel, model: Model
         if (shift <= _RESTS * spread).all() and (step <= spread).all():
             return grid
         reach = _REACH * spread + step + np.where(np.isfinite(shift), shift, 0.0)
-        limits = np.outer((-_LARGEST_POWER, _LARGEST_POWER), changes)
         ends = np.clip(np.stack((middle - reach, middle + reach)), *limits)
         model, value = _stepped(Term(fitted, term.measure), model, value, np.exp(middle @ term.points.T)[None], bounds)
     return None

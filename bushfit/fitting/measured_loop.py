@@ -14,7 +14,7 @@ from bushfit.fitting.prepared_loop import PreparedLoop
 from bushfit.fitting.shared_errors import SharedErrors
 from bushfit.model.model import Model
 from bushfit.model.result import Outlier
-from bushfit.model.sensitivity import force_and_slopes, force_slopes_of_branches, stiffness_and_slopes
+from bushfit.model.sensitivity import force_and_slopes, force_slopes_of_branches
 from bushfit.reading.measurement import Loop
 from bushfit.reduction.harmonics import basis
 
@@ -141,38 +141,26 @@ class MeasuredLoop(MeasuredBase):
         force = self.prepared.interpolate_at_rows(force) + (self.prepared.datum or 0.0)
         return force if values is not None else self._keep("force", model, (), force)
 
-    def residual(self, model: Model, values: Values | None = None, added: Array | None = None) -> Array:
-        """Whitened residuals: model minus measured force in units of noise.
+    def residual(self, model: Model, values: Values | None = None) -> Array:
+        """Whitened residuals: model minus measured force in units of noise, (..., size); see `MeasuredBase`."""
+        return self.whiten((self.force(model, values) - self.prepared.force) * self._per_noise)
 
-        Args:
-            model: model to evaluate.
-            values: parameter values in place of the model's; leading axes are added to the result.
-            added: stiffness added to the model's in the first harmonic, complex (1,) [N/m or N m/rad].
+    def jacobian(self, model: Model, names: Sequence[str]) -> Array:
+        """Derivatives of the whitened residuals by parameter value [SI]; the last are cached.
 
         Returns:
-            Residuals, (..., size).
+            Derivatives, (len(names), size).
         """
-        rows = self.whiten((self.force(model, values) - self.prepared.force) * self._per_noise)
-        return rows if added is None else rows + self.residual_change(added, model)
-
-    def jacobian(
-        self, model: Model, names: Sequence[str], added: Array | None = None, *, as_share: bool = False
-    ) -> Array:
-        """Derivatives of the whitened residuals by parameter value [SI], (len(names), size); see `MeasuredBase`."""
-        if (rows := self._recall("jacobian", model, tuple(names))) is None:
-            history = self.prepared.history(model.is_transient)
-            if model.only_branches:  # whose derivatives do not need the force
-                slopes = force_slopes_of_branches(model, self.direction, history, names)
-            else:
-                force, slopes = force_and_slopes(model, self.direction, history, names, self.test_conditions)
-                self._keep("force", model, (), self.prepared.interpolate_at_rows(force) + (self.prepared.datum or 0.0))
-            rows = self.whiten(self.prepared.interpolate_at_rows(slopes) * self._per_noise)
-            self._keep("jacobian", model, tuple(names), rows)
-        if added is None or not as_share:
+        if (rows := self._recall("jacobian", model, tuple(names))) is not None:
             return rows
-        test = self.direction, self.frequency, self.amplitude
-        stiffness, slopes = stiffness_and_slopes(model, *test, names, "loop", self.test_conditions)
-        return rows + self.residual_change(added / stiffness * slopes, model)
+        history = self.prepared.history(model.is_transient)
+        if model.only_branches:  # whose derivatives do not need the force
+            slopes = force_slopes_of_branches(model, self.direction, history, names)
+        else:
+            force, slopes = force_and_slopes(model, self.direction, history, names, self.test_conditions)
+            self._keep("force", model, (), self.prepared.interpolate_at_rows(force) + (self.prepared.datum or 0.0))
+        rows = self.whiten(self.prepared.interpolate_at_rows(slopes) * self._per_noise)
+        return self._keep("jacobian", model, tuple(names), rows)
 
     def residual_change(self, change: Array, model: Model, added: Array | float = 0.0) -> Array:
         """Change of the whitened residuals, (..., size), by a small change of the model's stiffness.

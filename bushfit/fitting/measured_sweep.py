@@ -209,46 +209,23 @@ class MeasuredSweep(MeasuredBase):
         stiffness = distinct[..., distinct_index]
         return stiffness if values is not None else self._keep("stiffness", model, (), stiffness)
 
-    def residual(self, model: Model, values: Values | None = None, added: Array | None = None) -> Array:
-        """Whitened residuals: model minus measured in units of noise.
-
-        Args:
-            model: model to evaluate.
-            values: parameter values in place of the model's; leading axes are added to the result.
-            added: stiffness added to the model's at each point, complex (n,) [N/m or N m/rad].
-
-        Returns:
-            Residuals, (..., 2 n): n gains, then n phases.
-        """
-        stiffness = self.stiffness(model, values)
-        with np.errstate(divide="ignore", invalid="ignore"):  # not finite where there is no stiffness: within free play
-            return self.whiten(self.deviation(stiffness if added is None else stiffness + added))
-
-    def jacobian(
-        self, model: Model, names: Sequence[str], added: Array | None = None, *, as_share: bool = False
-    ) -> Array:
-        """Derivatives of the whitened residuals by parameter value [SI]; the last are cached.
-
-        Args:
-            model: model at whose values the derivatives are taken.
-            names: names of the k parameters.
-            added: stiffness added to the model's at each point, complex (n,) [N/m or N m/rad].
-            as_share: True if the added stiffness remains proportional to the model's; False if it is constant.
-
-        Returns:
-            Derivatives, (k, 2 n): n gains, then n phases.
-        """
-        if added is None and (rows := self._recall("jacobian", model, tuple(names))) is not None:
-            return rows
+    def stiffness_slopes(self, model: Model, names: Sequence[str]) -> tuple[Array, Array]:
+        """Stiffness of a model at the points of the sweep, complex (n,), and its derivatives by parameter, (k, n)."""
         frequency, amplitude, conditions, distinct_index = self._operating_points(model)
         points = self.direction, frequency, amplitude
         stiffness, slopes = stiffness_and_slopes(model, *points, names, conditions=conditions)
-        stiffness, slopes = stiffness[distinct_index], slopes[:, distinct_index]
-        self._keep("stiffness", model, (), stiffness)
-        if added is None:
-            return self._keep("jacobian", model, tuple(names), self.residual_change(slopes, model))
-        grown = 1.0 + added / stiffness if as_share else 1.0
-        return self.residual_change(grown * slopes, model, added)
+        return self._keep("stiffness", model, (), stiffness[distinct_index]), slopes[:, distinct_index]
+
+    def residual(self, model: Model, values: Values | None = None) -> Array:
+        """Whitened residuals: model minus measured in units of noise, (..., 2 n); see `MeasuredBase`."""
+        return self.whiten(self.deviation(self.stiffness(model, values)))
+
+    def jacobian(self, model: Model, names: Sequence[str]) -> Array:
+        """Derivatives of the whitened residuals by parameter value [SI], (len(names), 2 n); the last are cached."""
+        if (rows := self._recall("jacobian", model, tuple(names))) is not None:
+            return rows
+        rows = self.residual_change(self.stiffness_slopes(model, names)[1], model)
+        return self._keep("jacobian", model, tuple(names), rows)
 
     def residual_change(self, change: Array, model: Model, added: Array | float = 0.0) -> Array:
         """Change of the whitened residuals by a small change of the model's stiffness.
@@ -257,6 +234,9 @@ class MeasuredSweep(MeasuredBase):
             change: change of the model's stiffness, complex (..., n) [N/m or N m/rad].
             model: model whose stiffness changes.
             added: stiffness added to the model's at the points, complex (n,) [N/m or N m/rad].
+
+        Returns:
+            Changes, (..., 2 n): of n gains, then of n phases.
         """
         stiffness = self.stiffness(model) + added
         relative = change / stiffness
@@ -275,11 +255,12 @@ class MeasuredSweep(MeasuredBase):
         Returns:
             Stiffness minus measurement, complex (..., n): relative difference in |K| + i difference in phase [rad].
         """
-        if self.residuals == "complex":
-            return np.log(stiffness / self.measured)
-        gain = np.abs(stiffness / self.measured) - 1.0
-        loss = stiffness.imag / stiffness.real - self.measured.imag / self.measured.real
-        return gain + 1j * loss * self._phase_per_loss
+        with np.errstate(divide="ignore", invalid="ignore"):  # not finite where there is no stiffness: within free play
+            if self.residuals == "complex":
+                return np.log(stiffness / self.measured)
+            gain = np.abs(stiffness / self.measured) - 1.0
+            loss = stiffness.imag / stiffness.real - self.measured.imag / self.measured.real
+            return gain + 1j * loss * self._phase_per_loss
 
     @cached_property
     def _phase_per_loss(self) -> Array:

@@ -60,33 +60,20 @@ class MeasuredBase(ABC):
         """
 
     @abstractmethod
-    def residual(self, model: Model, values: Values | None = None, added: Array | None = None) -> Array:
+    def residual(self, model: Model, values: Values | None = None) -> Array:
         """Whitened residuals: model minus measured in units of noise; independent with variance 1 for a true model.
 
         Args:
             model: model to evaluate.
             values: parameter values in place of the model's; leading axes are added to the result.
-            added: stiffness added to the model's at each operating point (one in a loop), complex [N/m or N m/rad].
 
         Returns:
             Residuals in the force of each row, (..., size); of a sweep of n points, n gains, then n phases.
         """
 
     @abstractmethod
-    def jacobian(
-        self, model: Model, names: Sequence[str], added: Array | None = None, *, as_share: bool = False
-    ) -> Array:
-        """Derivatives of the whitened residuals by parameter value [SI]; the last are cached.
-
-        Args:
-            model: model at whose values the derivatives are taken.
-            names: names of the k parameters.
-            added: stiffness added to the model's at each operating point (one in a loop), complex [N/m or N m/rad].
-            as_share: True if the added stiffness remains proportional to the model's; False if it is constant.
-
-        Returns:
-            Derivatives per SI unit of each parameter, (k, size).
-        """
+    def jacobian(self, model: Model, names: Sequence[str]) -> Array:
+        """Derivatives of the whitened residuals by parameter value [SI], (len(names), size); the last are cached."""
 
     @property
     @abstractmethod
