@@ -47,11 +47,11 @@ class FittedTests:
     Args:
         solution: result of the fit, with each test whitened separately.
         rig_errors: for each test, change of its n whitened residuals by one standard deviation of each of the w errors
-            of the rig, (w, n).
+            of the rig, (w, n); empty without such errors.
     """
 
     solution: FitResult
-    rig_errors: Sequence[Array]
+    rig_errors: Sequence[Array] = ()
 
     @property
     def data_sets(self) -> Sequence[MeasuredTest]:
@@ -162,9 +162,10 @@ class FittedTests:
             components of the residuals orthogonal to this basis, (d,).
         """
         rows, residual = self.solution.jacobian, self.solution.residual
-        pairs = list(zip(self._blocks, self.rig_errors, strict=True))
+        rig_errors = self.rig_errors or [np.empty((0, test.size)) for test in self.data_sets]
+        pairs = list(zip(self._blocks, rig_errors, strict=True))
         across = np.concatenate([rows[:, block] @ errors.T for (_, block, *_), errors in pairs], axis=1)
-        among = block_diag(*(errors @ errors.T for errors in self.rig_errors))
+        among = block_diag(*(errors @ errors.T for errors in rig_errors))
         information = np.block([[rows @ rows.T, across], [across.T, among + np.eye(len(among))]])
         scale = np.sqrt(np.maximum(np.diag(information), np.finfo(float).tiny))
         size, vectors = np.linalg.eigh(information / np.outer(scale, scale))

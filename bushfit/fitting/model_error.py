@@ -93,7 +93,7 @@ def with_model_error(
     closest, size = closest_fit(plain_fit, bounds)
     if size >= SIZES[-1]:  # that is no error of a model, but another thing than it
         return plain_fit, None
-    tests = _fitted_tests(closest, _thinned(plain_fit.problem.tests, size))
+    tests = FittedTests(closest.reevaluate(closest.model, _thinned(plain_fit.problem.tests, size)))
     sizes = np.geomspace(_SMOOTH_RATIO[0] * size, _SMOOTH_RATIO[1] * size, 9)
     processes = [replace(process, sizes=sizes) for process in discrepancies(tests)]
     likeliest = max(processes, key=lambda process: process.best[0])
@@ -101,7 +101,8 @@ def with_model_error(
     if error.rms >= SIZES[-1]:
         return plain_fit, None
     weighed = [test.with_model_error(size) for test in plain_fit.covariance_tests or plain_fit.problem.tests]
-    whole = Discrepancy.over_tests(_fitted_tests(closest, weighed), likeliest.groups, likeliest.lengths, MAXIMUM_NODES)
+    fitted = FittedTests(closest.reevaluate(closest.model, weighed))
+    whole = Discrepancy.over_tests(fitted, likeliest.groups, likeliest.lengths, MAXIMUM_NODES)
     columns = whole.tests.residual_changes(likeliest.best[1] * whole.complex_shapes)
     process = SmoothError(columns, likeliest.likelihood.freedom(likeliest.best[1]))
     closest = replace(closest, noise_weighted=plain_fit.data_sets, outliers=plain_fit.outliers)
@@ -204,7 +205,7 @@ def log_likelihood(solution: FitResult, prior_precision: Mapping[str, float]) ->
     """
     size = max(test.model_error for test in solution.problem.tests)
     bare = [replace(test, model_error=0.0) for test in solution.problem.tests]
-    tests = _fitted_tests(solution, _thinned(bare, size))
+    tests = FittedTests(solution.reevaluate(solution.model, _thinned(bare, size)))
     rows, residual = tests.free_jacobian, tests.solution.residual
     information, gain = rows @ rows.T, 0.0
     if size:
@@ -271,11 +272,6 @@ def _errors_of_class(test: MeasuredTest, rig: RigSettings) -> Array:
     uncounted = np.sqrt(np.maximum(np.square(class_errors(rig)) - np.square(test.noise.level), 0.0))
     columns = level_error_columns(test)
     return columns * np.tile(uncounted, len(columns) // 2)[:, None]
-
-
-def _fitted_tests(solution: FitResult, tests: Sequence[MeasuredTest]) -> FittedTests:
-    """Evaluate a fit for reweighted or thinned tests, for the estimate of a smooth model error without rig errors."""
-    return FittedTests(solution.reevaluate(solution.model, tests), [np.empty((0, test.size)) for test in tests])
 
 
 def _thinned(tests: Sequence[MeasuredTest], error: float = 0.0) -> list[MeasuredTest]:

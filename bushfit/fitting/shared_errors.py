@@ -11,8 +11,8 @@ from bushfit.effects.contract import Array
 
 #: Variance along a direction, relative to the largest, below which it is rounding.
 _ROUNDING = 1e-14
-#: Number of entries of the directions of groups from which on they are a sparse array.
-_MANY_ENTRIES = 1_000_000
+#: Number of entries of the directions of groups from which on they are a sparse array, which is then faster.
+_MANY_ENTRIES = 30_000
 
 
 @dataclass(frozen=True, eq=False)

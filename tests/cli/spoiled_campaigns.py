@@ -4,6 +4,7 @@
 BUSHING = '[bushing]\nname = "x"\ninner_radius = "10 mm"\nouter_radius = "18 mm"\nlength = "34 mm"\n'
 #: (text of the campaign, text instead of it, what the error says ...)
 IN_CAMPAIGN = [
+    ("[bushing]", f"{BUSHING.replace('[bushing]', '[[bushings]]')}[bushing]", "two lists of bushings"),
     ("[bushing]", "[bushings]", "campaign.toml, bushings: this value is not understood", "write [[bushings]], in two brackets"),
     ('name = "Test bushing"\n', "", "campaign.toml, bushing.name: a key is missing", "name = ..."),
     ('name = "Test bushing"', 'name = ""', "campaign.toml, bushing.name: this value is not understood", "a text that is not empty"),

@@ -261,7 +261,7 @@ def test_the_likelihood_is_averaged_over_the_process(refitted):
     (sweep,) = (replace(test, model_error=0.0) for test in refitted.problem.tests)
     solution, free = refitted.reevaluate(refitted.model, [sweep]), ["mu", "m"]
     cases, jacobian_rows = list[tuple[float, float]](), solution.jacobian
-    for process in discrepancies(FittedTests(solution, [np.empty((0, sweep.size))])):
+    for process in discrepancies(FittedTests(solution)):
         units = process.tests.columns(process.complex_shapes)
         eigenvalues, vectors = np.linalg.eigh(units.T @ units)
         for size in SIZES:
