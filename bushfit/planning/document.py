@@ -1,5 +1,6 @@
 """plan.json: the tests of a plan and their expected results."""
 
+from collections import defaultdict
 from collections.abc import Callable, Sequence
 from typing import Literal
 
@@ -10,7 +11,7 @@ from bushfit.campaign.simulated import SimulatedLoop
 from bushfit.effects import get_effect, qualified_name
 from bushfit.effects.contract import Array
 from bushfit.planning.contract import Aim, Test, operating_points
-from bushfit.planning.search import RIVALS_APART, PlanSearch
+from bushfit.planning.search import DETECTABLE, RIVALS_APART, PlanSearch
 from bushfit.planning.targets import PlannedQuantity
 
 
@@ -156,7 +157,7 @@ def plan_document(
     """
     knowledge, request, minutes = search.knowledge, search.request, search.minutes_of(runs)
     planned, standard = search.count_runs(runs), search.count_runs(search.standard_runs)
-    standard_amounts = search.detectable_amounts(standard)
+    standard_amounts = detectable_amounts(search, standard)
     covariances = [search.error_covariance(counts) for counts in (0 * planned, planned, standard)]
 
     def compared(error: Callable[[Array], float]) -> ErrorComparison:
@@ -201,7 +202,7 @@ def plan_document(
                 "planned": amount,
                 "standard": standard_amounts[name],
             }
-            for name, amount in search.detectable_amounts(planned).items()
+            for name, amount in detectable_amounts(search, planned).items()
         },
         "rivals": rivals,
         "warnings": list(warnings),
@@ -229,3 +230,32 @@ def planned_run(test: Test, minutes: float) -> PlannedRun:
         "cycles": test.cycles if isinstance(test, SimulatedLoop) else None,
         "minutes": minutes,
     }
+
+
+def detectable_amounts(search: PlanSearch, counts: Array) -> dict[str, float | None]:
+    """Compute the smallest amount of each effect that runs detect in 90 % of the cases by a test at the 5 % level.
+
+    Args:
+        search: search with the candidate tests.
+        counts: number of runs of each test, (tests,).
+
+    Returns:
+        Amount [SI] by name, for effects that the standard programme can detect; None if the runs detect none.
+
+    Notes:
+        Noise alone would permit amounts that many repeats average out, such as 0.1 g of moving mass. The accuracy
+        class of a rig limits its errors at each frequency and amplitude, not only their average: an amount is
+        detected only if it changes the response somewhere by more than the class. Of the shapes of an effect, such
+        as the frequencies of a resonance, the median is reported: the most visible one, a resonance at a tested
+        frequency, is a rare case.
+    """
+    model = search.models[0]
+    ratios = model.class_ratios[counts > 0].max(axis=0, initial=0.0)
+    with np.errstate(divide="ignore"):
+        smallest = np.maximum(DETECTABLE / np.sqrt(model.total(counts).noncentralities()[0]), 1.0 / ratios)
+    amounts = defaultdict[str, list[float]](list)
+    for index in np.flatnonzero(search.minimum_noncentrality).tolist():
+        effect = search.effects[index]
+        amounts[effect.name].append(effect.amount.typical * float(smallest[index]))
+    medians = {name: float(np.median(sizes)) for name, sizes in amounts.items()}
+    return {name: median if np.isfinite(median) else None for name, median in medians.items()}

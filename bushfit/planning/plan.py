@@ -9,8 +9,8 @@ import numpy as np
 from bushfit.errors import ModelError
 from bushfit.planning.candidates import unlimited_rig_warning
 from bushfit.planning.contract import Knowledge, PlanRequest, Test
-from bushfit.planning.criterion import add_runs, order_runs
 from bushfit.planning.document import PlanFile, plan_document
+from bushfit.planning.exchange import add_runs, order_runs
 from bushfit.planning.search import RIVALS_APART, PlanSearch
 from bushfit.planning.targets import UNLIMITED_RUNS, PlannedQuantity, format_half_width
 from bushfit.units import number
@@ -110,7 +110,7 @@ def explain_miss(search: PlanSearch, goal: PlannedQuantity) -> str | None:
     if goal.met(covariance(counts)):
         return None
     more = add_runs(
-        replace(search.strict_criterion, weight=goal.weight(limit)),
+        replace(search, goals=[goal]),
         replace(search.budget, maximum_minutes=np.inf),
         counts,
         enough=lambda runs: goal.met(covariance(runs)) or search.budget.spent(runs) > _LONGEST_MINUTES,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import Counter, defaultdict
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from bushfit.campaign.simulated import SimulatedSweep
+from bushfit.diagnosis.next_test import remaining_entropy
 from bushfit.diagnosis.priors import DECISIVE_CHI_SQUARE
 from bushfit.effects import Effect
 from bushfit.effects.contract import Array
@@ -19,8 +20,8 @@ from bushfit.model.covariance import Z95
 from bushfit.model.result import Range, Result
 from bushfit.planning.candidates import candidates, standard_tests
 from bushfit.planning.contract import Knowledge, PlanRequest, Test
-from bushfit.planning.criterion import Budget, Criterion, best_runs
-from bushfit.planning.information import CandidateGrid, ModelInformation, rival_chi_squares
+from bushfit.planning.exchange import Budget, best_runs
+from bushfit.planning.information import CandidateGrid, Information, ModelInformation, rival_chi_squares
 from bushfit.planning.targets import UNLIMITED_RUNS, PlannedQuantity
 from bushfit.prediction.caveats import unfitted_warnings
 
@@ -33,7 +34,7 @@ DETECTABLE = Z95 + _NINE_OF_TEN
 #: an expected d scatters by 2 sqrt(d), and `diagnose` does not separate rivals within DECISIVE_CHI_SQUARE.
 RIVALS_APART = (_NINE_OF_TEN + float(np.sqrt(_NINE_OF_TEN**2 + DECISIVE_CHI_SQUARE))) ** 2
 
-#: Penalty weight of the criterion for effects that are detected less well than with the standard programme, and the
+#: Penalty weight of the objective for effects that are detected less well than with the standard programme, and the
 #: weight that is used if the first leaves such effects; chosen.
 _PENALTY, _STRICT_PENALTY = 3.0, 30.0
 #: Wanted degrees of freedom of the scatter of sweeps; chosen: with five, errors are a tenth larger than planned.
@@ -57,6 +58,7 @@ class PlanSearch:
         predictions: stiffness and loss factor of each direction of the request.
         goals: parameter or prediction of each target of the request.
         budget: durations of the tests, and available hours.
+        penalty: weight in the objective of effects that are detected less well than with the standard programme.
     """
 
     knowledge: Knowledge
@@ -67,6 +69,7 @@ class PlanSearch:
     predictions: list[PlannedQuantity]
     goals: list[PlannedQuantity]
     budget: Budget
+    penalty: float = _STRICT_PENALTY
 
     @classmethod
     def from_request(cls, knowledge: Knowledge, request: PlanRequest) -> PlanSearch:
@@ -107,19 +110,43 @@ class PlanSearch:
         If possible, the tests detect every effect as well as the standard programme does.
         """
         required = self.required_runs
-        counts = best_runs(replace(self.strict_criterion, penalty=_PENALTY), self.budget, required, required)
+        counts = best_runs(replace(self, penalty=_PENALTY), required, required)
         if self.less_visible_effects(counts):
             standard = np.minimum(self.count_runs(self.standard_runs), self.budget.maximum_runs)
             starts = [counts, *([] if required.any() else [standard])]
-            choices = (best_runs(self.strict_criterion, self.budget, start, required) for start in starts)
-            counts = min(choices, key=self.strict_criterion.value)
+            choices = (best_runs(self, start, required) for start in starts)
+            counts = min(choices, key=self.objective)
         return self.with_scatter(self.with_repeats(counts))
 
-    @cached_property
-    def strict_criterion(self) -> Criterion:
-        """Criterion with a large penalty for effects that the tests detect less well than the standard programme."""
-        probabilities = np.array([rival.probability for rival in self.knowledge.rivals])
-        return Criterion(self.models, self.weight, probabilities, self.minimum_noncentrality, _STRICT_PENALTY)
+    def objective(self, counts: Array) -> float:
+        """Objective that the plan minimises, for `counts` runs of each test, (tests,)."""
+        return float(self.objectives([model.total(counts) for model in self.models])[0])
+
+    def objectives_with_one_more(self, counts: Array) -> Array:
+        """Objective with one run of each test in turn added to `counts`, (tests,)."""
+        return self.objectives([model.with_one_more(counts) for model in self.models])
+
+    def objectives(self, informations: Sequence[Information]) -> Array:
+        """Compute the objective that the plan minimises for several choices of tests.
+
+        It is the logarithm of a weighted parameter variance, or of the entropy of the rival models, plus a penalty for
+        each missing effect that the tests would detect less well than the standard programme does.
+
+        Args:
+            informations: information on each model, in the order of `models`, with a first axis over the choices.
+
+        Returns:
+            Objective for each choice, (choices,).
+        """
+        if self.weight is None:
+            probabilities = [rival.probability for rival in self.knowledge.rivals]
+            entropy = remaining_entropy(probabilities, rival_chi_squares(informations[1:]))
+            aim = np.log(np.maximum(entropy, np.finfo(float).tiny))
+        else:
+            aim = np.log(np.einsum("tij,ij->t", self.models[0].error_covariance(informations[0]), self.weight))
+        wanted = self.minimum_noncentrality > 0.0
+        share = informations[0].noncentralities()[:, wanted] / self.minimum_noncentrality[wanted]
+        return aim - self.penalty * np.sum(np.log(np.clip(share, 1e-12, 1.0)), axis=1)  # finite
 
     @cached_property
     def standard_runs(self) -> list[int]:
@@ -154,7 +181,7 @@ class PlanSearch:
         """
         required = np.zeros(len(self.tests), dtype=int)
         if self.goals:
-            values = self.strict_criterion.values_with_one_more(required)
+            values = self.objectives_with_one_more(required)
             for goal in self.goals:
                 chosen = np.array([test.direction == goal.place for test in self.tests])
                 chosen &= self.budget.maximum_runs > 0
@@ -218,33 +245,6 @@ class PlanSearch:
         short = np.sqrt(reached) < 0.995 * np.sqrt(self.minimum_noncentrality)  # numerical accuracy
         return list(dict.fromkeys(self.effects[index].name for index in np.flatnonzero(short)))
 
-    def detectable_amounts(self, counts: Array) -> dict[str, float | None]:
-        """Compute the smallest amount of each effect that runs detect in 90 % of the cases by a test at the 5 % level.
-
-        Args:
-            counts: number of runs of each test, (tests,).
-
-        Returns:
-            Amount [SI] by name, for effects that the standard programme can detect; None if the runs detect none.
-
-        Notes:
-            Noise alone would permit amounts that many repeats average out, such as 0.1 g of moving mass. The accuracy
-            class of a rig limits its errors at each frequency and amplitude, not only their average: an amount is
-            detected only if it changes the response somewhere by more than the class. Of the shapes of an effect, such
-            as the frequencies of a resonance, the median is reported: the most visible one, a resonance at a tested
-            frequency, is a rare case.
-        """
-        model = self.models[0]
-        ratios = model.class_ratios[counts > 0].max(axis=0, initial=0.0)
-        with np.errstate(divide="ignore"):
-            smallest = np.maximum(DETECTABLE / np.sqrt(model.total(counts).noncentralities()[0]), 1.0 / ratios)
-        amounts = defaultdict[str, list[float]](list)
-        for index in np.flatnonzero(self.minimum_noncentrality).tolist():
-            effect = self.effects[index]
-            amounts[effect.name].append(effect.amount.typical * float(smallest[index]))
-        medians = {name: float(np.median(sizes)) for name, sizes in amounts.items()}
-        return {name: median if np.isfinite(median) else None for name, median in medians.items()}
-
     def with_repeats(self, counts: Array) -> Array:
         """Repeat one test in each direction with more than two tests, so that repeats show drift and noise.
 
@@ -258,7 +258,7 @@ class PlanSearch:
             chosen = np.flatnonzero((counts > 0) & (self.budget.place == place))
             if chosen.size > 2 and counts[chosen].max() < 2:
                 quickest = chosen[np.argsort(self.budget.minutes[chosen])][:4]
-                counts = min(self.with_one_repeat(counts, quickest), key=self.strict_criterion.value, default=counts)
+                counts = min(self.with_one_repeat(counts, quickest), key=self.objective, default=counts)
         return counts
 
     def with_scatter(self, counts: Array) -> Array:
@@ -271,18 +271,18 @@ class PlanSearch:
             Number of runs of each test, (tests,). Unless there are targets, the errors grow by at most a twentieth.
         """
         # 0.1 in the logarithm of the variance is a twentieth of the error
-        largest = np.inf if self.goals else self.strict_criterion.value(counts) + 0.1
+        largest = np.inf if self.goals else self.objective(counts) + 0.1
         while not self.determines_scatter(counts):
             freedom = self.scatter_freedom(counts)
             sweeps = [test for test in np.flatnonzero(counts).tolist() if freedom_per_repeat(self.tests[test])]
             choices = [
                 runs
                 for runs in self.with_one_repeat(counts, sweeps)
-                if self.scatter_freedom(runs) > freedom and self.strict_criterion.value(runs) <= largest
+                if self.scatter_freedom(runs) > freedom and self.objective(runs) <= largest
             ]
             if not choices:
                 break
-            counts = min(choices, key=self.strict_criterion.value)
+            counts = min(choices, key=self.objective)
         return counts
 
     def with_one_repeat(self, counts: Array, tests: Iterable[int]) -> Iterator[Array]:
@@ -304,7 +304,7 @@ class PlanSearch:
                 self.budget.spent(runs) > self.budget.maximum_minutes
                 and (single := (runs == 1) & (self.required_runs == 0)).any()
             ):
-                runs = min((runs - one[dropped] for dropped in np.flatnonzero(single)), key=self.strict_criterion.value)
+                runs = min((runs - one[dropped] for dropped in np.flatnonzero(single)), key=self.objective)
             if self.budget.spent(runs) <= self.budget.maximum_minutes:
                 yield runs
 
@@ -341,7 +341,7 @@ class PlanSearch:
 
     @cached_property
     def weight(self) -> Array | None:
-        """Matrix W, (k, k), of the search criterion trace(W C) with the parameters' covariance C; None for rivals."""
+        """Matrix W, (k, k), of the objective trace(W C) with the parameters' covariance C; None for rivals."""
         if self.request.aim == "rivals":
             return None
         if self.request.aim == "targets":

@@ -1,18 +1,20 @@
-"""Criterion for a choice of tests, search for the best choice within the hours, and order of the runs."""
+"""Durations of tests, exchange of tests for the best choice within the hours, and order of the runs."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bushfit.campaign.simulated import SimulatedLoop
-from bushfit.diagnosis.next_test import remaining_entropy
 from bushfit.effects.contract import Array
 from bushfit.planning.contract import PlanRequest, Test
-from bushfit.planning.information import Information, ModelInformation, rival_chi_squares
 from bushfit.progress import track
+
+if TYPE_CHECKING:
+    from bushfit.planning.search import PlanSearch
 
 #: Smallest useful decrease of the logarithm of the variance by a run or an exchange; chosen: 0.25 % of the error.
 _USEFUL_DECREASE = 5e-3
@@ -21,55 +23,6 @@ _RUN_SECONDS = 120.0
 #: Time for a point of a sweep [s] and to mount the bushing [min] if [rig] states none; chosen: some cycles to settle
 #: and some to average.
 _POINT_SECONDS, _SETUP_MINUTES = 30.0, 30.0
-
-
-@dataclass(frozen=True, eq=False)
-class Criterion:
-    """Objective that a plan minimises over the number of runs of each candidate test.
-
-    The objective is the logarithm of a weighted parameter variance, or of the entropy of the rival models, plus a
-    penalty for each missing effect that the tests would detect too weakly.
-
-    Args:
-        models: information of the tests on the likeliest model and the effects that it lacks, then on each rival model.
-        weight: matrix W of the variance to minimise, trace(W C) with the parameters' covariance C, (k, k); None to
-            separate rival models.
-        probabilities: present probabilities of the rival models, (rivals,).
-        minimum_noncentrality: smallest wanted noncentrality (expected chi-square) of each effect, (e,); 0 for none.
-        penalty: weight of the logarithm of each shortfall in noncentrality.
-    """
-
-    models: Sequence[ModelInformation]
-    weight: Array | None
-    probabilities: Array
-    minimum_noncentrality: Array
-    penalty: float
-
-    def value(self, counts: Array) -> float:
-        """Value of the objective for the number of runs of each test in `counts`, (tests,)."""
-        return float(self.values([model.total(counts) for model in self.models])[0])
-
-    def values_with_one_more(self, counts: Array) -> Array:
-        """Values of the objective with one run of each test in turn added to `counts`, (tests,)."""
-        return self.values([model.with_one_more(counts) for model in self.models])
-
-    def values(self, informations: Sequence[Information]) -> Array:
-        """Compute the objective for several choices of tests.
-
-        Args:
-            informations: information on each model, in the order of `models`, with a first axis over the choices.
-
-        Returns:
-            Value of the objective for each choice, (choices,).
-        """
-        if self.weight is None:
-            entropy = remaining_entropy(self.probabilities, rival_chi_squares(informations[1:]))
-            aim = np.log(np.maximum(entropy, np.finfo(float).tiny))
-        else:
-            aim = np.log(np.einsum("tij,ij->t", self.models[0].error_covariance(informations[0]), self.weight))
-        wanted = self.minimum_noncentrality > 0.0
-        share = informations[0].noncentralities()[:, wanted] / self.minimum_noncentrality[wanted]
-        return aim - self.penalty * np.sum(np.log(np.clip(share, 1e-12, 1.0)), axis=1)  # finite
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,12 +89,11 @@ class Budget:
         return np.where(barred | (self.spent(counts) + more > self.maximum_minutes), np.inf, more)
 
 
-def best_runs(criterion: Criterion, budget: Budget, start: Array, minimum_runs: Array) -> Array:
-    """Find the number of runs of each test that minimises the criterion within the budget.
+def best_runs(search: PlanSearch, start: Array, minimum_runs: Array) -> Array:
+    """Find the number of runs of each test that minimises the objective of a search within its budget.
 
     Args:
-        criterion: objective to minimise.
-        budget: durations and limits of the tests.
+        search: search with the objective and the budget.
         start: number of runs of each test to start from, (tests,).
         minimum_runs: smallest number of runs of each test, (tests,).
 
@@ -149,19 +101,20 @@ def best_runs(criterion: Criterion, budget: Budget, start: Array, minimum_runs: 
         Number of runs of each test within the budget, (tests,).
 
     Notes:
-        Greedy search by the decrease of the criterion per minute; then exchanges (Fedorov 1972): one run of a test, or
-        all its runs, are replaced by the best runs of the same duration, until no exchange lowers the criterion.
+        Greedy search by the decrease of the objective per minute; then exchanges (Fedorov 1972): one run of a test, or
+        all its runs, are replaced by the best runs of the same duration, until no exchange lowers the objective.
     """
-    counts = add_runs(criterion, budget, start)
-    best = criterion.value(counts)
+    counts = add_runs(search, search.budget, start)
+    best = search.objective(counts)
     for _ in range(8):  # nearly all plans take three
         before = best
         for test in track("tests of the plan exchanged", np.flatnonzero(counts).tolist()):
             for removed in {1, int(counts[test] - minimum_runs[test])} - {0}:
                 if counts[test] - removed < minimum_runs[test]:
                     continue
-                exchanged = add_runs(criterion, budget, counts - removed * (np.arange(counts.size) == test))
-                value = criterion.value(exchanged)
+                reduced = counts - removed * (np.arange(counts.size) == test)
+                exchanged = add_runs(search, search.budget, reduced)
+                value = search.objective(exchanged)
                 if value < best - _USEFUL_DECREASE:
                     counts, best = exchanged, value
                     break
@@ -171,12 +124,12 @@ def best_runs(criterion: Criterion, budget: Budget, start: Array, minimum_runs: 
 
 
 def add_runs(
-    criterion: Criterion, budget: Budget, counts: Array, enough: Callable[[Array], bool] = lambda _: False
+    search: PlanSearch, budget: Budget, counts: Array, enough: Callable[[Array], bool] = lambda _: False
 ) -> Array:
-    """Add runs one by one, each time the run with the largest decrease of the criterion per minute.
+    """Add runs one by one, each time the run with the largest decrease of the objective per minute.
 
     Args:
-        criterion: objective to minimise.
+        search: search with the objective.
         budget: durations and limits of the tests.
         counts: number of runs of each test to start from, (tests,).
         enough: function that returns true to stop adding runs, of the number of runs of each test, (tests,).
@@ -184,9 +137,9 @@ def add_runs(
     Returns:
         Number of runs of each test with the added runs, (tests,).
     """
-    counts, value = counts.copy(), criterion.value(counts)
+    counts, value = counts.copy(), search.objective(counts)
     while not enough(counts) and np.isfinite(minutes := budget.minutes_of_one_more(counts)).any():
-        values = criterion.values_with_one_more(counts)
+        values = search.objectives_with_one_more(counts)
         decrease = (value - values) / minutes
         best = int(np.argmax(np.where(np.isfinite(minutes), decrease, -np.inf)))
         if value - values[best] <= _USEFUL_DECREASE:
