@@ -134,7 +134,10 @@ def command(
     }
     results = [ResultFile(file, "raw", text.encode()) for file, text in written.items()]
     output.write(folder, results, document, files)
-    output.print(f"next: bushfit {'batch' if len(written) > 1 else 'run'} {quote_path(folder / target)}")
+    following = f"bushfit {'batch' if len(written) > 1 else 'run'} {quote_path(folder / target)}"
+    if any("bushfit reduce" in sentence for sentence in sentences):
+        following = f"bushfit reduce as stated above, then bushfit init again; or, without these tests, {following}"
+    output.print(f"next: {following}")
 
 
 def make_bushing(name: str, sizes: Mapping[str, str | None]) -> tuple[Bushing, dict[str, str]]:

@@ -76,8 +76,10 @@ class Claim:
 
     @property
     def sentence(self) -> str:
-        """Sentence that states the mistake, with the files of the affected tests."""
+        """Sentence that states the mistake, with the files of the affected tests, or with their names."""
         files = [file_or_name(test.test) for test in self.affected]
+        if len({*files}) < len(files):
+            files = [test.name for test in self.affected]
         return self.mistake.sentence.format(files=" and ".join(filter(None, (", ".join(files[:-1]), *files[-1:]))))
 
     @property

@@ -1,6 +1,7 @@
 """The fits a user asks for: static, dynamic, the two in turn, and all parameters together."""
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -218,10 +219,12 @@ def _fit_without_springpot(data: PreparedCampaign) -> FitResult:
 
 def _springpot_warning(data: PreparedCampaign, static: FitResult) -> str:
     """Warning that states by how many per cent leaving the springpot out changed the static parameters."""
-    values = static.model.values
-    try:
-        better, source = fit_two_step(data).result.model.values, "With m and alpha from this campaign's sweep"
-    except FitError:  # no sweep, or none that goes with the loops: a typical rubber tells as much as can be told
+    values, two_step = static.model.values, None
+    with suppress(FitError):  # no sweep, or none that goes with the loops
+        two_step = fit_two_step(data).result
+    if two_step and not two_step.at_bound:
+        better, source = two_step.model.values, "With m and alpha from this campaign's sweep"
+    else:
         ratio, alpha = _TYPICAL_SPRINGPOT
         fixed = {"m": ratio * values["mu"], "alpha": alpha}
         better = _fit_step(data, static.problem.tests, BASE, fixed).model.values

@@ -35,7 +35,7 @@ _RANKS = (
     "^Do not use",
     "^Find out|^Look",
     "^For .*estimate|^Values",
-    "include this error",
+    "include the misfit",
     "^Use|^For|^Settle",
     "only|do not|no more|near",
     "",

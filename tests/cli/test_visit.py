@@ -146,6 +146,7 @@ def test_what_has_to_be_reduced_is_left_out_with_the_way_on(typed, root, visited
     (told,) = json.loads(done.stdout)["left_out"]
     name = file.rpartition("/")[2]
     assert f"{name}: {said}; bushfit reduce lab/{name}" in told
+    assert "next: bushfit reduce as stated above, then bushfit init again; or, without" in " ".join(done.stderr.split())
     assert "results/lab" in done.stderr
 
 

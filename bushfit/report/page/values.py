@@ -51,6 +51,7 @@ def headline_texts(result: Result, prediction: Prediction) -> dict[str, str]:
         "place": str(place),
         "frequency": f"{number(frequency, 3)} Hz",
         "amplitude": format_range(length, to_length * amplitude),
+        "preload": f"preload {prediction.preload.text(place)}" if prediction.preload else "",
         "stiffness": f"{format_aligned(dynamic[:1], 4)[0]} {unit}",
         "stiffness_band": format_interval(dynamic),
         "loss_factor": format_aligned(loss[:1], 3)[0],
