@@ -76,9 +76,9 @@ def inspect_file(file: Path, test_options: Mapping[str, Any], of_book: Labels = 
         odd = turned + odd
         if "preload" in facts:
             entry.setdefault("preload", facts["preload"])
-    columns = describe_columns(table, is_sweep=is_sweep)
-    facts |= label_facts
-    return Inspection(file, kind, place, describe_format(table), columns, facts, tuple(odd), entry, measured, counted)
+    contents = describe_format(table), describe_columns(table, is_sweep=is_sweep), facts | label_facts, tuple(odd)
+    is_uncounted = is_sweep and not counted and "amplitude" not in entry
+    return Inspection(file, kind, place, *contents, entry, measured, amplitude_convention_unknown=is_uncounted)
 
 
 def read_history(file: Path, test_options: Mapping[str, Any]) -> tuple[Loop, Direction | None]:
@@ -194,8 +194,8 @@ def classify_recording(measured: Loop, by_name: Labels, test: LoopFile) -> tuple
         Kind of the recording, with its facts and oddities.
     """
     steps = steady_sines(measured)
-    points = {(round(np.log(frequency), 2), round(np.log(amplitude), 1)) for frequency, amplitude, _ in steps}
-    fastest = max((frequency for frequency, *_ in steps), default=0.0)
+    points = {(round(np.log(frequency), 2), round(np.log(amplitude), 1)) for frequency, amplitude in steps}
+    fastest = max((frequency for frequency, _ in steps), default=0.0)
     is_fast = fastest > _QUASI_STATIC
     if len(points) > 1 and is_fast:
         with suppress(MeasurementError):  # no steady sine after all

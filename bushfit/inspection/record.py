@@ -105,7 +105,8 @@ class Inspection:
         odd: one sentence for each oddity, such as an outlier.
         entry: further keys of the test's table in a campaign, with values as TOML gives them.
         measured: the test in SI.
-        states_convention: True if the header of a sweep states zero-to-peak or peak-to-peak.
+        amplitude_convention_unknown: True for a sweep that does not state whether its amplitudes are zero-to-peak or
+            peak-to-peak.
     """
 
     file: Path
@@ -117,7 +118,7 @@ class Inspection:
     odd: tuple[str, ...]
     entry: Mapping[str, Any] = field(default_factory=dict)
     measured: Loop | Sweep | None = None
-    states_convention: bool = False
+    amplitude_convention_unknown: bool = False
 
     @property
     def label(self) -> str:
@@ -134,11 +135,6 @@ class Inspection:
         """Number of the tested part, from a column, a name or the lines above the table; None if unknown."""
         number: str | None = self.entry.get("specimen_number")
         return number
-
-    @property
-    def amplitude_convention_unknown(self) -> bool:
-        """True for a sweep that does not state whether its amplitudes are zero-to-peak or peak-to-peak."""
-        return self.kind == "sweep" and not self.states_convention and "amplitude" not in self.entry
 
     @property
     def assumed(self) -> str | None:

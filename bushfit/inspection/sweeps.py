@@ -61,7 +61,9 @@ def describe_sweep(sweep: Sweep, labels: Labels) -> Findings:
     noise, log_stiffness = sweep_noise([sweep]), np.log(sweep.stiffness)
     keys = {"frequency": sweep.frequency, "amplitude": sweep.amplitude, "repeat": sweep.repeat}
     points = pd.DataFrame({**keys, "gain": log_stiffness.real, "phase": log_stiffness.imag})
-    from_repeats = distance_from_repeats(points)
+    repeats = points.groupby(["frequency", "amplitude"])
+    from_median = points[["gain", "phase"]] - repeats[["gain", "phase"]].transform("median")
+    from_repeats = from_median.where(repeats["gain"].transform("size") >= 3)  # of fewer, the median is no reference
     level_texts = [f"{factor * level:.4g}" for level in levels[:_MOST_LEVELS]] + ["..."] * (levels.size > _MOST_LEVELS)
     facts = {
         "frequencies": format_frequencies(frequencies),
@@ -159,18 +161,6 @@ def missing_frequencies(place: Place, points: pd.DataFrame) -> Iterator[str]:
             yield f"{shown_amplitude(place, amplitude)}{of_repeat} lacks {listed} Hz, which most others have"
 
 
-def distance_from_repeats(points: pd.DataFrame) -> pd.DataFrame:
-    """Gain and phase [rad] of each point minus the median of its repeats; nan for points with fewer than three.
-
-    Args:
-        points: frequency, amplitude, repeat and ln K (gain and phase) of the points of a sweep.
-    """
-    groups, values = points.groupby(["frequency", "amplitude"]), points[["gain", "phase"]]
-    distance = values - groups[["gain", "phase"]].transform("median")
-    distance[groups["gain"].transform("size") < 3] = np.nan
-    return distance
-
-
 def distance_from_curve(sweep: Sweep, points: pd.DataFrame) -> Array:
     """Gain and phase [rad] of each point of a sweep minus a smooth curve through its run, (n, 2).
 
@@ -214,7 +204,7 @@ def outlying_points(sweep: Sweep, noise: SweepNoise, points: pd.DataFrame, from_
         sweep: sweep [SI].
         noise: noise of the sweep.
         points: frequency, amplitude, repeat and ln K (gain and phase) of its points.
-        from_repeats: gain and phase [rad] of each point minus the median of its repeats.
+        from_repeats: gain and phase [rad] of each point minus the median of its repeats; nan for fewer than three.
 
     Returns:
         A sentence on each of the first four outliers, and one on the number of further outliers.
@@ -246,7 +236,7 @@ def outlying_blocks(place: Place, points: pd.DataFrame, from_repeats: pd.DataFra
     Args:
         place: direction or specimen.
         points: frequency, amplitude, repeat and ln K (gain and phase) of the points of a sweep.
-        from_repeats: gain and phase [rad] of each point minus the median of its repeats.
+        from_repeats: gain and phase [rad] of each point minus the median of its repeats; nan for fewer than three.
 
     Returns:
         One sentence for each outlying block, and one on the drift.

@@ -3,6 +3,7 @@
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from math import comb
 from typing import TypeVar
 
 import numpy as np
@@ -20,6 +21,20 @@ def median_and_scatter(values: Floats) -> tuple[float, float]:
     """Median and robust standard deviation (from the median absolute deviation) of values, (n,)."""
     middle = float(np.median(values))
     return middle, MEDIAN_TO_SIGMA * float(np.median(np.abs(values - middle)))
+
+
+def difference_noise(values: Floats, order: int) -> Floats:
+    """Standard deviation of white noise on a smooth series, from the median size of its differences.
+
+    Args:
+        values: series, (..., n).
+        order: order of the differences; the higher, the less a slow motion contributes.
+
+    Returns:
+        Standard deviation of each series, (...).
+    """
+    size = np.median(np.abs(np.diff(values, order, axis=-1)), axis=-1)
+    return np.asarray(size * (MEDIAN_TO_SIGMA / comb(2 * order, order) ** 0.5))  # the sum of the squared weights
 
 
 def median(values: Floats, axis: int = 0) -> Floats:

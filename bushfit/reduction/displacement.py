@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from bushfit.errors import MeasurementError, error_location
 from bushfit.reading.displacements import FEWEST_ROWS, DisplacementHistory, even_time
 from bushfit.reading.measurement import Loop
-from bushfit.reduction.arrays import MEDIAN_TO_SIGMA
+from bushfit.reduction.arrays import difference_noise
 from bushfit.units import number
 
 #: Ratio of mean to range of a displacement above which the mean is the zero of a transducer; chosen: no rubber follows.
@@ -24,8 +24,6 @@ _CLOSED = 0.01
 _SEGMENT, _SHARE, _ABOVE = 4096, 8, 4.0
 #: Order of the filter: at half of the cut-off frequency, it changes the motion by 0.4 %.
 _ORDER = 4
-#: Standard deviation of the fourth difference of white noise over that of the noise.
-_FOURTH = np.sqrt(70.0)
 #: Cycles of the cut-off frequency by which the filter extends a record, point-symmetric about its ends.
 _EXTENSION = 3.0
 
@@ -46,7 +44,7 @@ def noise_and_highest_frequency(value: NDArray[Any], step: float) -> tuple[float
     """
     from scipy.signal import welch  # slow to import, and few results have histories
 
-    noise = MEDIAN_TO_SIGMA * float(np.median(np.abs(np.diff(value, n=4)))) / _FOURTH
+    noise = float(difference_noise(value, 4))
     frequency, density = welch(value, 1.0 / step, nperseg=min(_SEGMENT, max(value.size // _SHARE, 8)))
     return noise, float(frequency[density > _ABOVE * 2.0 * noise**2 * step].max(initial=frequency[1]))
 

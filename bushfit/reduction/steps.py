@@ -75,14 +75,14 @@ def reduce(histories: Sequence[Loop], *, fewest_cycles: int = 3, levels: Sequenc
     return Reduction(direction, tuple(group_steps(steps, levels, direction)), tuple(skipped), outliers)
 
 
-def steady_sines(history: Loop) -> list[tuple[float, float, int]]:
+def steady_sines(history: Loop) -> list[tuple[float, float]]:
     """Find the steady stretches of a history, to recognise a stepped sine, without computing operating points.
 
     Args:
         history: record of time, displacement and force.
 
     Returns:
-        Frequency [Hz], approximate zero-to-peak amplitude [m or rad] and number of cycles of each stretch.
+        Frequency [Hz] and approximate zero-to-peak amplitude [m or rad] of each stretch of two cycles or more.
     """
     cycles = Cycles.find(history.time, history.displacement)
     found = []
@@ -91,7 +91,7 @@ def steady_sines(history: Loop) -> list[tuple[float, float, int]]:
         for part in steady_pieces(edges, np.log(amplitude)):
             if (count := part.stop - part.start) > 1:
                 frequency = count / float(edges[part.stop] - edges[part.start])
-                found.append((frequency, float(np.median(amplitude[part])), count))
+                found.append((frequency, float(np.median(amplitude[part]))))
     return found
 
 

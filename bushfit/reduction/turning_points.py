@@ -1,13 +1,12 @@
 """Turning points of a motion, without the turning points of noise and of a ripple on the motion."""
 
-from math import comb
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bushfit.reading.measurement import Floats
-from bushfit.reduction.arrays import MEDIAN_TO_SIGMA
+from bushfit.reduction.arrays import difference_noise
 
 #: Array of row indices.
 Integers = NDArray[np.intp]
@@ -192,8 +191,5 @@ def noise_threshold(values: Floats) -> float:
     if rows > order:
         starts = np.linspace(0, values.size - rows, min(2000, values.size // rows)).astype(np.intp)
         windows = np.lib.stride_tricks.sliding_window_view(values, rows)[starts]
-        differences = np.median(np.abs(np.diff(windows, order, axis=1)), axis=1)
-        # of white noise, the squared weights of such differences sum up to this binomial
-        noise = differences * (MEDIAN_TO_SIGMA / comb(2 * order, order) ** 0.5)
-        smallest = max(smallest, 10.0 * float(np.quantile(noise, 0.1)))
+        smallest = max(smallest, 10.0 * float(np.quantile(difference_noise(windows, order), 0.1)))
     return max(smallest, 4.0 * converter_step if converter_step < smallest else 0.0)
