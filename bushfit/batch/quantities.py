@@ -12,7 +12,7 @@ import numpy as np
 from bushfit.batch.document import Estimate
 from bushfit.effects import get_parameter, is_parameter, library_parameters
 from bushfit.errors import UnitError, did_you_mean
-from bushfit.geometry import STRAINING, TRANSLATION, Direction, Motion
+from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Direction, Motion
 from bushfit.reading.measurement import Sweep
 from bushfit.report.tables import spread_indices
 from bushfit.units import display_unit, is_compatible, parse_quantity
@@ -35,13 +35,18 @@ class Point:
         place: direction of the bushing, or name of a specimen, which every campaign of the batch must contain.
         frequency: frequency [Hz].
         amplitude: zero-to-peak amplitude [m or rad], or strain amplitude [1].
-        motion: kind of motion (translation, rotation or straining) of the place.
+        unit: SI unit of the amplitude.
     """
 
     place: str
     frequency: float
     amplitude: float
-    motion: Motion
+    unit: str
+
+    @property
+    def motion(self) -> Motion:
+        """Kind of motion (translation, rotation or straining) that has the unit of the amplitude."""
+        return next(motion for motion in (TRANSLATION, ROTATION, STRAINING) if motion.displacement_unit == self.unit)
 
     def __str__(self) -> str:
         unit, factor = self.motion.display.displacement
@@ -72,7 +77,7 @@ def parse_point(text: str) -> Point:
     frequency, amplitude = parse_quantity(match[2], "Hz"), parse_quantity(match[3], motion.displacement_unit)
     if not (frequency > 0.0 and amplitude > 0.0):
         raise UnitError("frequency and amplitude have to be above zero", found=repr(text), expected=expected)
-    return Point(match[1], frequency, amplitude, motion)
+    return Point(match[1], frequency, amplitude, motion.displacement_unit)
 
 
 _POINT_SCHEMA = {"type": "string", "description": 'a place, a frequency and an amplitude: "axial 25 Hz 0.1 mm"'}
@@ -181,7 +186,7 @@ def measured_curve(sweeps: Iterable[Sweep]) -> dict[str, float]:
         curve = {}
         for x in steps[spread_indices(steps.size, _CURVE_POINTS)].tolist():
             frequency, amplitude = (x, level) if sweep.stepped == "frequency" else (level, x)
-            point = Point(str(sweep.direction), frequency, amplitude, sweep.direction.motion)
+            point = Point(str(sweep.direction), frequency, amplitude, sweep.direction.motion.displacement_unit)
             curve[str(point)] = float(np.abs(sweep.stiffness[(constant == level) & (step == x)]).mean())
         return curve
     return {}
