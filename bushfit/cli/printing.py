@@ -59,10 +59,11 @@ def print_result(output: Output, title: str, result: Result) -> None:
     print_parameters(output, title, result)
     if quality := result.quality:
         gain = quality.loop_gain_error
+        of_loops = " (of loops, the first harmonic only)" if result.model.unnamed and gain else ""
         loops = f", gain error of a loop {number(100 * gain, 2)} % ([rig] gain_error)" if gain else ""
         output.print(
             f"NRMSE {number(100 * quality.nrmse, 2)} %, reduced chi-square {number(quality.reduced_chi_square, 3)} "
-            f"over {quality.points} values, noise {number(100 * quality.noise, 2)} % per point{loops}"
+            f"over {quality.points} values{of_loops}, noise {number(100 * quality.noise, 2)} % per point{loops}"
         )
     print_tests(output, result.tests, result.usable)
     if correlations := correlation_texts(result, 0.0) if output.verbose else correlation_texts(result):

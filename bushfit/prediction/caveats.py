@@ -154,7 +154,7 @@ def unfitted_warnings(result: Result, direction: Place) -> Iterator[str]:
             )
         return
     radially = direction.axis is Direction.RADIAL or (Direction.AXIAL not in axes and Direction.RADIAL in axes)
-    formula, error = Direction.TORSION, "which was not compared with finite elements"
+    formula, error = Direction.TORSION, "which replaces the uneven strain by one value"
     if radially and bushing:
         formula, error = Direction.RADIAL, _radial_error(bushing)
     if formula in corrected:
