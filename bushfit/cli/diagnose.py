@@ -123,7 +123,7 @@ def print_findings(output: Output, diagnosed: DiagnosisOutput) -> None:
     console, diagnosis, document = output.console, diagnosed.diagnosis, diagnosed.document
     for effect in document["effects"]:
         _print_effect(output, effect)
-    _print_gap(output, document)
+    _print_gap(output, document, diagnosis.changed)
     for title, regions in (("where", diagnosis.where), ("what remains", diagnosis.remainder)):
         if regions and not (title == "what remains" and diagnosis.remainder == diagnosis.where):
             console.print(f"  [bold]{title}[/bold]")
@@ -133,14 +133,20 @@ def print_findings(output: Output, diagnosed: DiagnosisOutput) -> None:
         console.print(f"  [bold]next test:[/bold] {escape(diagnosis.next_test)}")
 
 
-def _print_gap(output: Output, document: Mapping[str, Any]) -> None:
-    """Print the gap (misfit in units of noise), for held-out and fitted data, and the expected error of the model."""
+def _print_gap(output: Output, document: Mapping[str, Any], changed: bool) -> None:
+    """Print the gap (misfit in units of noise), for held-out and fitted data, and the expected error of the model.
+
+    Args:
+        output: where to print.
+        document: content of diagnosis.json.
+        changed: True if the model or the record differs after the diagnosis.
+    """
     gap, usable, console = document["gap"], document["usable"], output.console
     held_out = gap["heldout"]
     cells = [f"{held_out[when]:.2f}" for when in ("before", "after")] if held_out else ["not testable", ""]
     rows = (("held out", *cells), ("data fitted", *(f"{value:.2f}" for value in gap["calibration"].values())))
-    title = "gap (measured minus model) in units of the noise; 1: noise alone" + "; no effect was added" * (
-        document["verdict"] == "ambiguous"
+    title = "gap (measured minus model) in units of the noise; 1: noise alone" + "; nothing was added" * (
+        document["verdict"] != "consistent" and not changed
     )
     output.print_table(title, ("", "before", "after"), rows)
     if usable:

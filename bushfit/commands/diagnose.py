@@ -152,14 +152,14 @@ def _require_free_parameter(data: PreparedCampaign, model: Model | None, setting
 
 
 def _with_plan(diagnosis: Diagnosis, campaign: Campaign) -> Diagnosis:
-    """Add to the next test of an ambiguous diagnosis the command `bushfit plan` that distinguishes its effects.
+    """Add to the next test the command `bushfit plan` that distinguishes the effects that the tests leave open.
 
     Args:
-        diagnosis: the diagnosis; other verdicts are returned unchanged.
+        diagnosis: the diagnosis; one without several candidate effects is returned unchanged.
         campaign: campaign of the diagnosis.
     """
     path = campaign.path
-    if diagnosis.verdict != "ambiguous" or path.suffix != ".toml" or not (sets := undecided_effects(diagnosis)):
+    if path.suffix != ".toml" or not (sets := undecided_effects(diagnosis)):
         return diagnosis
     printed_path = Path(path.name) if path.is_absolute() else path  # results hold no path of a machine
     command = f"bushfit plan {quote_path(printed_path)} --rivals {','.join(sets[0])}"

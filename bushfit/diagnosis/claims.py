@@ -8,6 +8,7 @@ user decides whether to correct it.
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -160,7 +161,9 @@ def claims(data: PreparedCampaign, without: Collection[str]) -> list[Claim]:
         if mistake.name in without:
             continue
         if not mistake.kinds:
-            found += [Claim(data, mistake, ())] if bushing else []
+            with suppress(ModelError):  # no bushing has the corrected dimensions
+                if bushing and mistake.corrected_bushing(bushing) != bushing:
+                    found.append(Claim(data, mistake, ()))
             continue
         indices = [
             index

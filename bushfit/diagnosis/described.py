@@ -56,42 +56,60 @@ class GapDescription:
         return Description(law.phase_deg, law.frequency_power, law.amplitude_power, law.sentence)
 
 
-def describe(evidence: Evidence, rig: RigSettings, start: Mapping[str, float], bounds: Bounds) -> GapDescription | None:
+def describe(
+    evidence: Evidence,
+    rig: RigSettings,
+    start: Mapping[str, float],
+    bounds: Bounds,
+    *,
+    before: Evidence | None = None,
+    has_candidates: bool = False,
+) -> GapDescription | None:
     """Describe the gap (measured minus modelled stiffness) by a correction smooth in ln frequency and ln strain.
 
-    The description has the power law of frequency and amplitude that is nearest to the correction. Its form within a
-    cycle is unknown, so loops are represented by their first harmonic.
+    The form of the correction is the nearest power law of frequency and amplitude. Its form within a cycle is unknown,
+    so loops are represented by their first harmonic.
 
     Args:
         evidence: the fitted model and the tests.
         rig: stated accuracy class of the rig (gain and phase errors).
         start: starting values read from the data, for a model whose parameters the gap has distorted.
         bounds: limits of parameters inside their general limits.
+        before: fit of the starting model, to compare held-out residuals with; None for `evidence`.
+        has_candidates: True if known effects explain the gap, so that it is certain and has their form.
 
     Returns:
-        The description; None without a valid correction: if it does not raise the likelihood or has an error larger
-        than the gap, if the model has a correction already, or if the first harmonics cannot be fitted.
+        The description; None without a valid correction: if it does not raise the likelihood (with candidates: does not
+        reduce the held-out residuals) or has an error larger than the gap, if the model has a correction already, or if
+        the first harmonics cannot be fitted.
     """
     if NAME in evidence.model.effects:
         return None
-    fitted, correction = with_model_error(evidence.solution, bounds, smooth=True)
+    law, harmonic = None, tuple(test.fundamental() for test in evidence.data_sets)
+    fitted, correction = with_model_error(evidence.solution, bounds, smooth=True, certain=has_candidates)
     if correction is None or correction.uncertainty >= 1.0:
         return None
-    harmonic = tuple(test.fundamental() for test in evidence.data_sets)
-    try:
-        problem = FitProblem.with_fixed(evidence.model, harmonic, evidence.fixed, bounds)
-        base = Descent.start(problem).run(_EVALUATIONS).solution
-        problem = FitProblem.with_fixed(base.model, harmonic, (*evidence.fixed, *base.at_bound), bounds)
-        base = Descent.start(problem).run(_EVALUATIONS).solution
-    except FitError:  # too few points are left for the parameters
-        return None
+    half = Z95 * correction.uncertainty * correction.largest
+    sentence = f"up to {number(100.0 * correction.largest, 2)} ± {number(100.0 * half, 2)} % of |K|"
+    if not has_candidates:
+        try:
+            problem = FitProblem.with_fixed(evidence.model, harmonic, evidence.fixed, bounds)
+            base = Descent.start(problem).run(_EVALUATIONS).solution
+            problem = FitProblem.with_fixed(base.model, harmonic, (*evidence.fixed, *base.at_bound), bounds)
+            base = Descent.start(problem).run(_EVALUATIONS).solution
+        except FitError:  # too few points are left for the parameters
+            return None
+        law = nearest_power_law(Evidence(base), rig, start, bounds)
+        law = law if law and law.is_likely and any(law.determined) else None
+        sentence += f"; {law.sentence if law else 'its form is not a power law'}"
     model = replace(fitted.model, effects=(*evidence.model.effects, NAME), unnamed=correction)
     after = Evidence(fitted.reevaluate(model, harmonic))
     whole = Evidence(fitted.reevaluate(model, evidence.data_sets))
-    law = nearest_power_law(Evidence(base), rig, start, bounds)
-    law = law if law and law.is_likely and any(law.determined) else None
-    sentences = _form(correction, law), _validity(correction, whole)
-    return GapDescription(after, fitted, _hold_out_inside(evidence, fitted), law, *sentences)
+    holdout = _hold_out_inside(evidence, fitted)
+    if has_candidates and (holdout.after or 0.0) >= (holdout.before or np.inf):
+        return None
+    holdout = _hold_out_inside(before, fitted) if before else holdout
+    return GapDescription(after, fitted, holdout, law, sentence, _validity(correction, whole))
 
 
 def _hold_out_inside(before: Evidence, fitted: FitResult) -> HoldOut:
@@ -127,19 +145,6 @@ def _hold_out_inside(before: Evidence, fitted: FitResult) -> HoldOut:
         if not any(fit.undetermined(mask).any() for fit, mask in pairs):  # else the rest does not determine the model
             residuals[name] = np.array([fit.predicted(mask, np.arange(mask.size)) for fit, mask in pairs])
     return HoldOut.from_residuals(residuals)
-
-
-def _form(correction: Unnamed, law: PowerLaw | None) -> str:
-    """Text on the gap's largest size relative to |K|, the half width of its 95 % interval, and the form of the gap.
-
-    Args:
-        correction: smooth relative correction of the stiffness that closes the gap.
-        law: nearest power law; None without one.
-    """
-    half = Z95 * correction.uncertainty * correction.largest
-    largest, band = (number(100.0 * share, 2) for share in (correction.largest, half))
-    form = law.sentence if law else "its form is not a power law"
-    return f"up to {largest} ± {band} % of |K|; {form}"
 
 
 def _validity(correction: Unnamed, whole: Evidence) -> str:

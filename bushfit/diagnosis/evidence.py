@@ -67,6 +67,11 @@ class Evidence:
         return len(self.solution.names)
 
     @property
+    def mean_square(self) -> float:
+        """Mean square of the residuals, in squared units of noise."""
+        return self.chi_square / max(sum(data_set.residual_count for data_set in self.data_sets), 1)
+
+    @property
     def reduced_chi_square(self) -> float:
         """Chi-square per degree of freedom; 1 if the residuals are noise alone."""
         counted = sum(data_set.residual_count for data_set in self.data_sets)

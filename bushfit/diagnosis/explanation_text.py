@@ -1,5 +1,6 @@
 """Names, texts and probabilities of the explanations of a gap, and the table of all candidates."""
 
+from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -81,6 +82,26 @@ def claim_entries(
     ]
 
 
+def undecided_text(reported: Sequence[Composition]) -> str:
+    """Sentence that lists explanations that the tests cannot distinguish, and what all of them contain."""
+    parts = [label(composition).split(" + ") for composition in reported]
+    shared = [name for name in parts[0] if all(name in names for names in parts)]
+    *labels, last = (" + ".join(name for name in names if name not in shared) or "nothing else" for names in parts)
+    sentence = f"these tests cannot distinguish between {', '.join(labels)} and {last}"
+    return f"all probable explanations contain {' and '.join(shared)}; beside this, {sentence}" if shared else sentence
+
+
+def causes_text(candidates: Sequence[Composition], finding: Finding) -> list[str]:
+    """Sentences on the possible causes of a gap: candidates with probabilities, and leads, or mistakes to check."""
+    claims = {c.best.claim.key if c.best.claim else None: c.best.claim for c in finding.reported}
+    if all(claims.values()):
+        return [f"check first whether {' or whether '.join(claim.sentence for claim in claims.values() if claim)}"]
+    names = [f"{label(candidate)} ({format_probability(candidate.probability)})" for candidate in candidates]
+    sentences = [f"the cause may be {' or '.join(names)}"] if names else []
+    sentences += [f"leads: {' and '.join(finding.leads)}"] if finding.leads else []
+    return sentences or ["no known effect explains the gap"]
+
+
 def explanation_odds(finding: Finding) -> Odds:
     """List the reported explanations with texts, probabilities and fitted models.
 
@@ -121,9 +142,11 @@ def list_candidates(
     log_posteriors = np.array([hypothesis.log_posterior for hypothesis in hypotheses])
     weights = np.exp(log_posteriors - log_posteriors[0])
     shares = (weights / weights.sum()).tolist()
-    candidates, alone = list[CandidateResult](), dict[str, Evidence]()
+    candidates, alone, probability = list[CandidateResult](), dict[str, Evidence](), defaultdict[str, float](float)
     for hypothesis, share in zip(hypotheses, shares, strict=True):
         evidence, claim = hypothesis.state.evidence, hypothesis.claim
+        for name in {*hypothesis.effects}:
+            probability[name] += share
         if len(hypothesis.key) != 1:
             continue
         if hypothesis.refitted and hypothesis.effects:
@@ -134,14 +157,12 @@ def list_candidates(
             candidates.append(CandidateResult(" + ".join(claim.labels), gain, gain, share, {}, why))
     for proposal in search.root.proposals:
         name, after = proposal.name, alone.get(proposal.name)
-        pairs = zip(hypotheses, shares, strict=True)
-        probability = sum(share for hypothesis, share in pairs if name in hypothesis.effects)
         if after is None:
             why = "score too small to refit" if proposal.visible else "not visible in these tests"
-            candidates.append(CandidateResult(name, proposal.score, None, probability, {}, why))
+            candidates.append(CandidateResult(name, proposal.score, None, probability[name], {}, why))
             continue
         values = {key: value for key, value in after.model.values.items() if key not in base.model.values}
         why = "part of the most probable explanation" if first and name in first.names else _LESS_LIKELY
         gain = base.chi_square - after.chi_square
-        candidates.append(CandidateResult(name, proposal.score, gain, probability, values, why))
+        candidates.append(CandidateResult(name, proposal.score, gain, probability[name], values, why))
     return sorted(candidates, key=lambda candidate: -candidate.score)

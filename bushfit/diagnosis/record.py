@@ -30,8 +30,10 @@ from bushfit.validation import to_json_data
 
 #: Probability above which no further digits are shown.
 _NEARLY_ONE = 0.995
+#: Meaning of the probability of an explanation.
+_MEANING = "Each probability is that of this cause, alone or together with further causes."
 #: Probability below which other explanations are not mentioned.
-_LEAST_TOLD = 0.01
+_LEAST_REPORTED = 0.01
 
 
 @dataclass(frozen=True)
@@ -221,7 +223,7 @@ class Diagnosis:
     @property
     def calibration(self) -> tuple[float, float]:
         """Root mean square of the fitted residuals before and after the diagnosis, in units of noise."""
-        return _rms(self.before), _rms(self.after)
+        return self.before.mean_square**0.5, self.after.mean_square**0.5
 
     def to_document(self) -> DiagnosisFile:
         """Convert the diagnosis to the content of diagnosis.json.
@@ -314,28 +316,23 @@ def format_odds(document: Mapping[str, Any]) -> list[str]:
     """
     if document["verdict"] == "consistent":
         lines = [f"Probability that nothing is missing: {format_probability(document['nothing'])}."]
-        if 1.0 - document["nothing"] > _LEAST_TOLD:
+        if 1.0 - document["nothing"] > _LEAST_REPORTED:
             small = format_probability(1.0 - document["nothing"])
             lines.append(f"Probability of an effect too small for these tests to show: {small}.")
         return lines
     lines = [f"probability {format_probability(entry['probability'])}: {entry['words']}" for entry in document["odds"]]
     rest = 1.0 - sum(entry["probability"] for entry in document["odds"])
-    if lines and rest > _LEAST_TOLD:
+    if lines and rest > _LEAST_REPORTED:
         lines.append(f"probability {format_probability(rest)}: other explanations together")
-    if lines and document["nothing"] > _LEAST_TOLD:
+    if lines and document["nothing"] > _LEAST_REPORTED:
         lines.append(f"Probability that nothing is missing: {format_probability(document['nothing'])}.")
-    return lines
+    return [*lines, *([_MEANING] if lines else [])]
 
 
 def level_of(name: str) -> str:
     """Level of an effect or mistake: material, component, instrument or record; "unresolved" if it has twins."""
     candidate = get_candidate(name)
     return "unresolved" if candidate.twins or name == UNNAMED else str(candidate.level)
-
-
-def _rms(evidence: Evidence) -> float:
-    """Root mean square of the residuals of a fit, in units of noise."""
-    return float((evidence.chi_square / max(sum(data_set.residual_count for data_set in evidence.data_sets), 1)) ** 0.5)
 
 
 def _region_entry(region: MisfitRegion) -> MisfitRegionEntry:

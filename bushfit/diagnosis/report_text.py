@@ -11,12 +11,13 @@ from bushfit.diagnosis.evidence import Evidence, fit, result_of
 from bushfit.diagnosis.explanation_text import (
     LEVELS,
     NAMELESS,
+    causes_text,
     claim_entries,
     explanation_odds,
     label,
     list_candidates,
     probability_text,
-    reported_names,
+    undecided_text,
 )
 from bushfit.diagnosis.holdout import HoldOut, hold_out
 from bushfit.diagnosis.hypotheses import DiagnosisRequest, Hypothesis, mean_parameters
@@ -73,69 +74,39 @@ class DiagnosisWriter:
             Verdict, effects, regions, hold-out, next test and the model to use.
         """
         verdict, first = self.finding.verdict, self.first
-        if verdict == "consistent":
-            return self._build(verdict, _NOTHING, self.request.base)
-        if verdict == "ambiguous":
-            return self._ambiguous()
-        if first and verdict in ("named", "partly"):
+        if first is None:
+            return self._build(_NOTHING, self.request.base)
+        if verdict in ("named", "partly"):
             return self._mistaken_record(first) if first.best.claim else self._named(first)
-        return self._without_name()
+        return self._open(first)
 
     def _named(self, first: Composition) -> Diagnosis:
         """Diagnosis in which named effects explain the gap, or part of it with a description of the rest."""
-        request, names = self.request, self.finding.names
-        refitted = [h for h in self.hypotheses if h.refitted and not h.claim and set(h.effects) >= set(names)]
-        known, fixed, state = None, request.base.fixed, refitted[0].state
-        if self.finding.verdict == "partly" and first.unnamed:  # without the compound's deviation amounts are distorted
-            model = request.base.model
-            for name in names:
-                model = model.with_effect(name)
-            amounts = [name for name in model.values if name not in request.base.model.values]
-            added, known = mean_parameters(refitted, amounts)
-            model, fixed = model.with_values(added), [*fixed, *added]
-        else:
-            state = min((h.state for h in refitted), key=lambda state: len(state.effects) > len(names))
-            model = state.evidence.model
-            for name in state.effects:
-                model = model if name in names else model.without(name)
-        after = fit(model, state.evidence.data_sets, fixed, request.data.bounds)
-        base, plain = self._with_free_gains(request.base), self._with_free_gains(after)
-        company = " with the other named effects" if len(names) > 1 else ""
-        why = f"lowers chi-square by {base.chi_square - plain.chi_square:.0f}{company}; "
-        why += probability_text(first, self.finding)
-        entries = [NamedCause(name, why) for name in names]
-        gap, rest, holdout = None, list[str](), None
+        names, base = self.finding.names, self._with_free_gains(self.request.base)
+        after, known = self._fit_with(first)
+        plain, verbs = self._with_free_gains(after), ("closes", "explains") if len(names) == 1 else ("close", "explain")
+        why = f"lowers chi-square by {base.chi_square - plain.chi_square:.0f}"
+        why += " with the other named effects" * (len(names) > 1)
+        entries = [NamedCause(name, f"{why}; {probability_text(first, self.finding)}") for name in names]
+        gap, holdout, summary = None, None, f"{' and '.join(names)} {verbs[0]} the gap"
         if self.finding.verdict == "named":
-            holdout = hold_out(base, plain, request.data.bounds)
-            summary = f"{' and '.join(names)} {'closes' if len(names) == 1 else 'close'} the gap"
+            holdout = hold_out(base, plain, self.request.data.bounds)
         else:
-            excess = [
-                max(fitted.chi_square / sum(test.residual_count for test in fitted.data_sets) - 1.0, 0.0)
-                for fitted in (base, plain)
-            ]
+            excess = [max(fitted.mean_square - 1.0, 0.0) for fitted in (base, plain)]
             share = 100.0 * (1.0 - excess[1] / excess[0]) if excess[0] else 100.0
             part = f"{number(share, 2)} %" if share >= 1.0 else "part"
-            summary = f"{' and '.join(names)} {'explains' if len(names) == 1 else 'explain'} {part} of the gap"
-            rest = [part.name for part in first.faulty_parts] + [LEVELS] * first.best.levels
-            if not first.best.levels and (gap := self._described(after)):
-                entries.append(NamedCause(UNNAMED, gap.evidence))
-                rest.append(f"{NAMELESS} ({gap.sentence})")
-            elif first.unnamed:
-                rest.append(NAMELESS)
+            summary = f"{' and '.join(names)} {verbs[1]} {part} of the gap"
+            gap = None if first.best.levels else self._described(after)
+            entries += [NamedCause(UNNAMED, gap.evidence)] if gap else []
+        rest = [part.name for part in first.faulty_parts] + [LEVELS] * first.best.levels
+        rest += [f"{NAMELESS} ({gap.sentence})" if gap else NAMELESS] * bool(gap or first.unnamed)
+        places = first.best if first.faulty_parts else None
         diagnosis = self._build(
-            self.finding.verdict,
-            summary,
-            gap.after if gap else after,
-            entries,
-            " and ".join(rest),
-            places=first.best if first.faulty_parts else None,
-            gap=gap,
-            holdout=holdout,
-            known=known,
+            summary, gap.after if gap else after, entries, rest, places=places, gap=gap, holdout=holdout, known=known
         )
         absent = tuple(name for name in names if _may_be_absent(name, diagnosis.result))
         if holdout and (absent or (holdout.after or 0.0) > LARGEST_CLOSED_GAP):
-            finding = decide_verdict(self.hypotheses, request.settings.tolerance, gap_stays=True)
+            finding = decide_verdict(self.hypotheses, self.request.settings.tolerance, gap_stays=True)
         elif absent:  # the model does without these effects
             kept, leads = tuple(name for name in names if name not in absent), (*absent, *self.finding.leads)
             finding = replace(self.finding, verdict="partly" if kept else "described", names=kept, leads=leads)
@@ -143,12 +114,43 @@ class DiagnosisWriter:
             return diagnosis
         return replace(self, finding=finding).diagnosis()
 
+    def _fit_with(self, first: Composition) -> tuple[Evidence, Covariance | None]:
+        """Fit the starting model with the effects that are certain.
+
+        Args:
+            first: explanation with these effects. If the compound deviates beside them, the amounts of the effects are
+                their posterior means, because a fit without the deviation would distort them.
+
+        Returns:
+            The fit, and the covariance of the amounts that it kept fixed; None without any.
+        """
+        base, bounds, names = self.request.base, self.request.data.bounds, self.finding.names
+        if not names:
+            return base, None
+        refitted = [h for h in self.hypotheses if h.refitted and not h.claim and set(h.effects) >= set(names)]
+        if not first.unnamed:
+            state = min((h.state for h in refitted), key=lambda state: len(state.effects) > len(names))
+            model = state.evidence.model.without(*{*state.effects} - {*names})
+            return fit(model, base.data_sets, base.fixed, bounds), None
+        model = base.model
+        for name in names:
+            model = model.with_effect(name)
+        added, known = mean_parameters(refitted, [name for name in model.values if name not in base.model.values])
+        return fit(model.with_values(added), base.data_sets, [*base.fixed, *added], bounds), known
+
     def _described(self, evidence: Evidence) -> GapDescription | None:
         """Describe the gap of a fit by a smooth correction; None if effects are excluded or no correction is valid."""
-        data, fitted = self.request.data, self._with_free_gains(evidence)
+        data, base, fitted = self.request.data, self.request.base, self._with_free_gains(evidence)
         if not self.request.settings.max_effects:
             return None
-        return describe(fitted, data.campaign.rig, self.request.start, data.bounds)
+        return describe(
+            fitted,
+            data.campaign.rig,
+            self.request.start,
+            data.bounds,
+            before=self._with_free_gains(base),
+            has_candidates=self.finding.verdict == "ambiguous",
+        )
 
     def _mistaken_record(self, first: Composition) -> Diagnosis:
         """Diagnosis in which a mistake in the record explains the gap; the model to use is unchanged."""
@@ -158,9 +160,7 @@ class DiagnosisWriter:
         advice = f"if the records of the tests confirm this mistake, state {corrections} (or {command})"
         summary = f"these tests agree if {claim.sentence}"
         entries = claim_entries(first, self.finding, self.request.base)
-        diagnosis = self._build(
-            self.finding.verdict, summary, self.request.base, entries, places=best, next_test=advice
-        )
+        diagnosis = self._build(summary, self.request.base, entries, places=best, next_test=advice)
         warning = f"fitted to the tests as they are, which only agree if {claim.sentence}: {advice}"
         after = self._with_free_gains(best.state.evidence)
         return replace(
@@ -171,64 +171,69 @@ class DiagnosisWriter:
             result=replace(diagnosis.result, warnings=(*diagnosis.result.warnings, warning)),
         )
 
-    def _ambiguous(self) -> Diagnosis:
-        """Diagnosis in which the tests cannot distinguish several explanations, with the test that would."""
-        request, compositions = self.request, self.finding.reported
-        leader = next((c for c in compositions if c.names or c.best.claim), None)
-        alternatives = tuple(label(composition) for composition in compositions if composition is not leader)
-        fitted = [composition for composition in compositions if composition.best.effects and composition.best.refitted]
-        models = [composition.best.state.evidence.model for composition in fitted]
-        odds = [composition.probability for composition in fitted]
-        advice = deciding_test(models, odds, request.base.data_sets, request.data.campaign.rig)
-        entries: list[NamedCause] = []
-        if leader and leader.best.claim:
-            entries = claim_entries(leader, self.finding, request.base, alternatives)
-            advice = f"check the records of the tests; {'; '.join(leader.best.claim.corrections)}"
-        elif leader:
-            probability = probability_text(leader, self.finding)
-            entries = [NamedCause(name, probability, alternatives) for name in leader.names]
-        parts = [reported_names(composition) for composition in compositions]
-        shared = [name for name in parts[0] if all(name in other for other in parts)]
-        names = [" + ".join(name for name in some if name not in shared) for some in parts]
-        are_distinct = all(names) and len({*names}) == len(names)
-        *labels, last = names if are_distinct else (label(composition) for composition in compositions)
-        summary = f"these tests cannot distinguish between {', '.join(labels)} and {last}"
-        if shared and are_distinct:
-            summary = f"all probable explanations contain {' and '.join(shared)}; beside this, {summary}"
-        places = next((composition.best for composition in compositions if composition.faulty_parts), None)
-        return self._build("ambiguous", summary, request.base, entries, places=places, next_test=advice)
+    def _open(self, first: Composition) -> Diagnosis:
+        """Diagnosis of a gap without a certain cause: what closes it, candidates for the cause, and a deciding test.
 
-    def _without_name(self) -> Diagnosis:
-        """Diagnosis without a named effect: described by a correction, or unexplained, or with a faulty test."""
-        finding, best = self.finding, self.first.best if self.first else None
-        leads = f"; leads: {' and '.join(finding.leads)}" if finding.leads else ""
-        claims = {c.best.claim.key if c.best.claim else None: c.best.claim for c in finding.reported}
-        if claims and all(claims.values()):
-            sentences = [claim.sentence for claim in claims.values() if claim]
-            leads = f"; check first whether {' or whether '.join(sentences)}"
-        at_fault = " and ".join(part.name for part in best.faulty_parts) if best else ""
-        is_fault = best is not None and finding.verdict == "unexplained"
-        if not is_fault and (gap := self._described(self.request.base)):
-            summary = f"no known effect closes the gap: {gap.sentence}{leads}"
-            summary += f"; it is largest at {at_fault}" if at_fault else ""
-            return self._build("described", summary, gap.after, [NamedCause(UNNAMED, gap.evidence)], gap=gap)
-        summary, advice = "no known effect closes the gap" + leads, ""
-        if at_fault:
-            summary = f"measure again first: {at_fault}; all other tests disagree with this part"
-        elif is_fault:
-            summary = "the levels disagree by more than the class of the rig, and nothing else is missing"
-            advice = "measure the levels again in another session, or state the class of the rig (gain_error under "
-            advice += "[rig])"
-        return self._build("unexplained", summary, self.request.base, places=best, next_test=advice)
+        Effects that all probable explanations contain, and a smooth correction for the rest, close the gap, unless
+        tests or records may be wrong. The candidates are the reported explanations with causes that are not leads.
+        """
+        finding, reported, verdict = self.finding, self.finding.reported, self.finding.verdict
+        is_ambiguous = verdict == "ambiguous"
+        faulty = [composition for composition in reported if composition.faulty_parts] if is_ambiguous else [first]
+        may_be_wrong = is_ambiguous and (faulty or any(composition.best.claim for composition in reported))
+        after, known = self._fit_with(first)
+        gap = None if may_be_wrong or verdict == "unexplained" else self._described(after)
+        rest = "the rest of the gap" if finding.names else "the gap"
+        closing = [f"a smooth correction closes {rest}: {gap.sentence}"] if gap else []
+        candidates = [composition for composition in reported if {*composition.causes} - {*finding.leads}]
+        leader, advice = candidates[0] if candidates else first, self._deciding_test()
+        if claim := leader.best.claim:
+            advice = f"check the records of the tests; {'; '.join(claim.corrections)}"
+        elif leader.names and not advice:
+            advice = get_effect(leader.names[0]).confirmed_by
+        if is_ambiguous:
+            sentences = [undecided_text(reported), *closing]
+            others = tuple(label(composition) for composition in reported if composition is not leader)
+            entries = claim_entries(leader, finding, self.request.base, others)
+            entries += [NamedCause(x, probability_text(leader, finding), others) for x in leader.names if not claim]
+        else:
+            sentences = [*(closing or ["no known effect closes the gap"]), *causes_text(candidates, finding)]
+            entries = [NamedCause(UNNAMED, gap.evidence, tuple(map(label, candidates)))] if gap else []
+            at_fault = " and ".join(part.name for part in first.best.faulty_parts)
+            if gap:
+                sentences += [f"it is largest at {at_fault}"] if at_fault else []
+            elif at_fault:
+                sentences = [f"measure again first: {at_fault}; all other tests disagree with this part"]
+            elif verdict == "unexplained":
+                sentences = ["the levels disagree by more than the class of the rig, and nothing else is missing"]
+                advice = "measure the levels again in another session, or state the class of the rig (gain_error under "
+                advice += "[rig])"
+            verdict = "described" if gap else "unexplained"
+        return self._build(
+            "; ".join(sentences),
+            gap.after if gap else after,
+            entries,
+            verdict=verdict,
+            places=faulty[0].best if faulty and not gap else None,
+            next_test=advice,
+            gap=gap,
+            known=known,
+        )
+
+    def _deciding_test(self) -> str:
+        """Test that separates the reported explanations with effects; "" if none does."""
+        fitted = [c for c in self.finding.reported if c.best.effects and c.best.refitted]
+        models, odds = [c.best.state.evidence.model for c in fitted], [c.probability for c in fitted]
+        return deciding_test(models, odds, self.request.base.data_sets, self.request.data.campaign.rig)
 
     def _build(
         self,
-        verdict: Verdict,
         summary: str,
         after: Evidence,
         entries: Sequence[NamedCause] = (),
-        remainder: str = "",
+        remainder: Sequence[str] = (),
         *,
+        verdict: Verdict | None = None,
         places: Hypothesis | None = None,
         next_test: str = "",
         gap: GapDescription | None = None,
@@ -238,22 +243,19 @@ class DiagnosisWriter:
         """Build the diagnosis with regions, hold-out, candidates and the model to use.
 
         Args:
-            verdict: verdict in one word.
             summary: verdict as a sentence.
             after: fit with the additions, or the starting fit.
             entries: named effects or mistakes.
-            remainder: what the entries do not explain; "" if they explain the gap.
+            remainder: what the entries do not explain; empty if they explain the gap.
+            verdict: verdict in one word; None for that of the finding.
             places: hypothesis whose faulty parts of the tests are reported; None without any.
             next_test: advice on the next test; "" for the usual confirmation of the first entry.
             gap: description of a gap without a name; None without one.
             holdout: residuals of held-out tests, if they were computed before.
             known: covariance of parameters of effects that `after` kept fixed; None without any.
         """
-        base, after, bounds = (
-            self._with_free_gains(self.request.base),
-            self._with_free_gains(after),
-            self.request.data.bounds,
-        )
+        base, after = self._with_free_gains(self.request.base), self._with_free_gains(after)
+        verdict, bounds = verdict or self.finding.verdict, self.request.data.bounds
         if not next_test and entries:
             next_test = get_effect(entries[0].name).confirmed_by
         at_fault = list[MisfitRegion]()
@@ -274,7 +276,7 @@ class DiagnosisWriter:
         amounts = filter(None, (_format_amount(entry.name, result) for entry in entries))
         return Diagnosis(
             verdict,
-            "; ".join([summary, *amounts, *([f"the rest: {remainder}"] if remainder else [])]),
+            "; ".join([summary, *amounts, *([f"the rest: {' and '.join(remainder)}"] if remainder else [])]),
             tuple(entries),
             regions,
             regions if after is base else find_regions(after),

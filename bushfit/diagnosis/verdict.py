@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Hashable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import combinations, product
 from typing import NamedTuple
 
@@ -42,12 +42,15 @@ class Composition:
         return () if is_pattern(self.best.faulty_parts) else self.best.faulty_parts
 
     @property
+    def causes(self) -> tuple[str, ...]:
+        """Names of the mistake in the record and of the effects of the explanation."""
+        return (*([str(self.best.claim.mistake.name)] if self.best.claim else []), *self.names)
+
+    @property
     def parts(self) -> frozenset[str]:
         """Names of the effects, mistakes and kinds of faults of the explanation; "unnamed" for a smooth curve."""
-        best = self.best
-        marks = [f"part: {part.family}" for part in self.faulty_parts] + ["levels"] * best.levels
-        marks += ["unnamed"] * self.unnamed + ([str(best.claim.mistake.name)] if best.claim else [])
-        return frozenset((*self.names, *marks))
+        marks = [f"part: {part.family}" for part in self.faulty_parts] + ["levels"] * self.best.levels
+        return frozenset((*self.causes, *marks, *["unnamed"] * self.unnamed))
 
     @property
     def may_mislead(self) -> bool:
@@ -68,7 +71,7 @@ class Finding:
         nothing: probability that nothing is missing beyond noise and tolerance.
         reported: explanations to report, the nearly certain one or the most probable first; empty if consistent.
         leads: names of effects that reduce the gap but do not explain it.
-        names: names of effects that are reported as the explanation or part of it.
+        names: names of effects that are certain: the explanation or a part of it.
     """
 
     verdict: Verdict
@@ -100,52 +103,46 @@ def decide_verdict(hypotheses: Sequence[Hypothesis], tolerance: float, *, gap_st
         return Finding("consistent", nothing, ())
     compositions = compose(large)
     first, leads = compositions[0], _leads(large)
-    if first.probability >= NAMED:
-        return _single(first, nothing, leads)
     before = np.cumsum([0.0, *(composition.probability for composition in compositions[:-1])])
     likely = [composition for composition, sum_before in zip(compositions, before, strict=True) if sum_before < NAMED]
     common = frozenset.intersection(*(composition.parts for composition in likely))
     unnamed = sum(composition.probability for composition in likely if composition.unnamed)
-    certain = common | {"unnamed"} if unnamed > 0.5 else common
-    alone = next((composition for composition in likely if composition.parts == certain), None)
-    if alone is first:  # all that is probable has these parts; the tests show no other part, but that there is one
-        rivals = (composition for composition in likely if composition is not alone)
-        return replace(_single(alone, nothing, leads), reported=(alone, *rivals))
-    reported = tuple(likely[:MOST_REPORTED])
+    if first.parts == (common | {"unnamed"} if unnamed > 0.5 else common):
+        # all that is probable has these parts; the tests show no other part, but perhaps that there is one
+        return _verdict_on_parts(likely, nothing, leads)
+    reported, fits = tuple(likely[:MOST_REPORTED]), first.best.p_value >= DOES_NOT_FIT
     if common and all(part.startswith("part: ") for part in common):  # whatever else there is, this has to go first
         return Finding("unexplained", nothing, reported, leads)
-    nameless = sum(composition.probability for composition in likely if composition.parts == {"unnamed"})
-    fits = first.best.p_value >= DOES_NOT_FIT
-    if len(likely) <= MOST_REPORTED and nameless < 0.5 and fits:
-        return Finding("ambiguous", nothing, reported)
     share = {name: sum(c.probability for c in compositions if name in c.names) for name in first.names}
     names = tuple(name for name in first.names if share[name] >= NAMED)
+    nameless = sum(composition.probability for composition in likely if composition.parts == {"unnamed"})
+    if len(likely) <= MOST_REPORTED and nameless < 0.5 and fits:
+        return Finding("ambiguous", nothing, reported, names=names)
     if names and first.unnamed and fits:  # whatever the compound does beside them
         return Finding("partly", nothing, reported, leads, names)
     return Finding("described", nothing, reported, leads)
 
 
-def _single(first: Composition, nothing: float, leads: Sequence[str]) -> Finding:
-    """Decide the verdict if one explanation is nearly certain.
+def _verdict_on_parts(likely: Sequence[Composition], nothing: float, leads: Sequence[str]) -> Finding:
+    """Decide the verdict if the parts of the most probable explanation are nearly certain.
 
     Args:
-        first: the nearly certain explanation.
+        likely: probable explanations, the first with the parts that are certain.
         nothing: probability that nothing is missing.
         leads: names of effects that reduce the gap but do not explain it.
     """
-    best, names = first.best, first.names
-    mistakes = (best.claim.mistake.name,) if best.claim else ()
-    leads = tuple(dict.fromkeys((*mistakes, *names, *leads)))
-    if first.may_mislead or not (names or best.claim or first.unnamed):
-        return Finding("unexplained", nothing, (first,), leads)
+    first, best, reported = likely[0], likely[0].best, tuple(likely)
+    leads = tuple(dict.fromkeys((*first.causes, *leads)))
+    if first.may_mislead or not (first.causes or first.unnamed):
+        return Finding("unexplained", nothing, reported, leads)
     curve = best.unnamed not in ("", COMPOUND) and best.last_change >= (1.0 - LEAST_NAMED_SHARE) * best.change
     # a mistake has to close the gap alone, but for what the rubber does
     rig_effects = any(get_effect(name).level != Level.MATERIAL for name in best.effects)
     compensated = best.claim and (rig_effects or best.faulty_parts)
-    if not (names or best.claim) or curve or compensated or best.p_value < DOES_NOT_FIT:
-        return Finding("described", nothing, (first,), leads)
+    if not first.causes or curve or compensated or best.p_value < DOES_NOT_FIT:
+        return Finding("described", nothing, reported, leads)
     partly = first.unnamed or best.levels or first.faulty_parts or (best.claim and best.effects)
-    return Finding("partly" if partly else "named", nothing, (first,), names=names)
+    return Finding("partly" if partly else "named", nothing, reported, names=first.names)
 
 
 def _leads(pairs: Sequence[tuple[Hypothesis, float]]) -> tuple[str, ...]:

@@ -45,7 +45,8 @@ class Mistake(Effect):
         sweep_line: `line` for a sweep, if it differs.
         kinds: kinds of tests in which the mistake occurs; empty for a mistake in [bushing].
         motion: type of motion of these tests (translation or rotation); None for any.
-        displacement, force, time: ratios of the true to the stated quantity; `displacement` also applies to radii.
+        displacement, force, time: ratios of the true to the stated quantity in a test.
+        inner_radius, outer_radius, length: ratios of the true to the stated dimension in [bushing].
         stiffness: function from the stated to the true complex stiffness of a sweep, (n,) -> (n,) [N/m], for mistakes
             that the three ratios cannot describe; None otherwise.
         doubt: function that returns True if the stated complex stiffness, (n,), permits the mistake; None for always.
@@ -63,6 +64,9 @@ class Mistake(Effect):
     displacement: float = 1.0
     force: float = 1.0
     time: float = 1.0
+    inner_radius: float = 1.0
+    outer_radius: float = 1.0
+    length: float = 1.0
     stiffness: Callable[[Complex], Complex] | None = None
     doubt: Callable[[Complex], bool] | None = None
     swaps: bool = False
@@ -130,9 +134,17 @@ class Mistake(Effect):
         return _EXCHANGED.get(place, place) if self.swaps else place
 
     def corrected_bushing(self, bushing: Bushing) -> Bushing:
-        """Return a bushing with its radii corrected for this mistake, such as diameters given as radii."""
-        inner, outer = (self.displacement * radius for radius in (bushing.inner_radius, bushing.outer_radius))
-        return replace(bushing, inner_radius=inner, outer_radius=outer)
+        """Return a bushing with its dimensions corrected for this mistake, such as a diameter given as a radius.
+
+        Raises:
+            ModelError: the mistake is not possible, because no bushing has the corrected dimensions.
+        """
+        return replace(
+            bushing,
+            inner_radius=self.inner_radius * bushing.inner_radius,
+            outer_radius=self.outer_radius * bushing.outer_radius,
+            length=self.length * bushing.length,
+        )
 
     def correction_line(self, test: Loop | Sweep | None) -> str:
         """Line of the campaign file that corrects the mistake in a test, or in the bushing if `test` is None."""

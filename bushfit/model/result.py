@@ -341,7 +341,8 @@ class Result:
         added = (sorted(set(alternative.model.effects) - {*self.model.effects}) for alternative in self.alternatives)
         names = list(dict.fromkeys(" + ".join(alternative) for alternative in added if alternative))
         choice = "cannot distinguish between" if len(names) > 1 else "do not show whether the model lacks"
-        lacking = f"the tests {choice} {' and '.join(names)}: the prediction uses the plain model, and"
+        used = "a smooth correction instead" if self.model.unnamed else "the plain model"
+        lacking = f"the tests {choice} {' and '.join(names)}: the prediction uses {used}, and"
         open_values = "the tests permit other values of the parameters:"
         return [f"{lacking if names else open_values} the bands, low to high, include each alternative"]
 

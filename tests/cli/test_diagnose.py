@@ -137,10 +137,16 @@ def test_a_clean_campaign(bushfit, tmp_path):
 
 
 def test_look_alikes_are_told_with_their_odds(work, bushfit):
-    """And the page says what the terminal says."""
+    """And with what closes the gap meanwhile; the page says what the terminal says."""
     run = bushfit("diagnose", "case_003/bushing.toml", "-o", "alike", "--no-plots")
     written = document(work / "alike/diagnosis.json")
     assert written["verdict"] == "ambiguous"
+    assert written["summary"].startswith("these tests cannot distinguish between ")
+    assert "; a smooth correction closes the gap: up to " in written["summary"]
+    assert document(work / "alike/model.json")["effects"] == [*BASE, "unnamed"]
+    assert all(
+        gap["after"] < 0.5 * gap["before"] for gap in (written["gap"][key] for key in ("calibration", "heldout"))
+    )
     shares = [each["probability"] for each in written["odds"]]
     assert shares == sorted(shares, reverse=True)
     assert 0.97 <= sum(shares) <= 1.0

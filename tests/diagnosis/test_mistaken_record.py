@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from rigged import SHARED, Tamper, asked, said
 from tries import some
 
-from bushfit.campaign.campaign import Campaign, load_campaign
+from bushfit.campaign.campaign import load_campaign
 from bushfit.commands.diagnose import diagnose
 from bushfit.diagnosis.record import Diagnosis
 from bushfit.effects.mistakes import MISTAKES
@@ -42,9 +42,11 @@ def on_loops(change: Callable[[Loop], Loop], *numbers: int) -> Tamper:
     return lambda c: replace(c, loops=tuple(change(x) if i in numbers else x for i, x in enumerate(c.loops)))
 
 
-def as_diameters(c: Campaign) -> Campaign:
-    a, b = c.bushing.inner_radius, c.bushing.outer_radius
-    return replace(c, bushing=replace(c.bushing, inner_radius=2.0 * a, outer_radius=2.0 * b))
+def sized(**factors: float) -> Tamper:
+    """Dimensions in [bushing] stated wrong by these factors."""
+    return lambda c: replace(
+        c, bushing=replace(c.bushing, **{key: factor * getattr(c.bushing, key) for key, factor in factors.items()})
+    )
 
 
 in_kilograms = on_loops(lambda x: replace(x, force=x.force / 9.80665), 0, 1)
@@ -57,7 +59,10 @@ MADE: dict[str, Tamper] = {
         lambda s: replace(s, stiffness=np.abs(s.stiffness) * np.exp(1j * np.radians(np.angle(s.stiffness)))), 0
     ),
     "other_direction:sweep_radial": on_sweeps(lambda s: replace(s, direction=Direction.AXIAL), 1),
-    "diameters": as_diameters,
+    "diameters": sized(inner_radius=2.0, outer_radius=2.0),
+    "outer_diameter": sized(outer_radius=2.0),
+    "inner_radius_halved": sized(inner_radius=0.5),
+    "length_in_centimetres": sized(length=0.1),
 }
 
 

@@ -204,6 +204,7 @@ def told(finding: Finding) -> dict[str, float]:
         ({"inertia": 0.6, "inertia+delay": 0.39, "": 0.01}, "named", {"inertia": 1.0}),
         ({"inertia": 0.35, "inertia+delay": 0.65}, "ambiguous", {"inertia": 0.35, "delay+inertia": 0.65}),
         ({"inertia+delay": 0.99, "inertia": 0.01}, "named", {"delay+inertia": 0.99}),
+        ({"inertia+delay": 0.6, "inertia+viscous": 0.4}, "ambiguous", {"delay+inertia": 0.6, "inertia+viscous": 0.4}),
         ({"inertia": 0.69, "fixture_resonance": 0.31}, "named", {"inertia": 1.0}),
         ({"inertia": 0.31, "fixture_resonance": 0.69}, "ambiguous", {"fixture_resonance": 0.69, "inertia": 0.31}),
         ({"inertia": 0.6, "delay": 0.38, "viscous": 0.02}, "ambiguous", {"inertia": 0.6, "delay": 0.38}),
@@ -226,6 +227,8 @@ def test_verdicts(odds, verdict, expected):
     finding = of(**odds)
     assert (finding.verdict, told(finding)) == (verdict, expected)
     assert finding.nothing == pytest.approx(odds.get("", 0.0))
+    if verdict == "ambiguous":  # what all have is certain, whatever else there is
+        assert {*finding.names} == set.intersection(*({*name.split("+")} for name in odds)) - {"unnamed"}
 
 
 def test_what_changes_less_than_the_tolerance_is_nothing():
