@@ -107,13 +107,11 @@ class FaultyPart(Explanation):
         return self.group.whole
 
     def point_by_point(self) -> FaultyPart:
-        """Fault of the same points with an independent error of each, for faults other than a common shift or slope.
+        """Fault of the same points of sweeps with an independent error of each, in place of a common shift or slope.
 
         Returns:
-            Faulty part with one column for each residual of its points; a loop is returned unchanged.
+            Faulty part with one column for each residual of its points.
         """
-        if self.family == "loop":
-            return self
         size = np.abs(self.columns).max(axis=0)
         rows = np.flatnonzero(size)
         columns = np.zeros((rows.size, size.size))
