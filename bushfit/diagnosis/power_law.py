@@ -204,7 +204,15 @@ class Term:
         return shapes / np.abs(shapes * self.unit(model) / self.stiffness(model)).max(axis=-1)[:, None]
 
     def residual(self, value: Array, model: Model) -> Array:
-        """Whitened residuals of a model with an added stiffness `value` at the operating points, (n,)."""
+        """Whitened residuals of a model with an added stiffness.
+
+        Args:
+            value: added stiffness at the operating points, in the unit of the law, (p,).
+            model: model at its current parameters.
+
+        Returns:
+            Residuals of all tests and priors, (n,).
+        """
         residuals, added = self.evidence.solution.problem.residual(model), value * self.unit(model)
         for test, points in self.tests:
             rows = self.evidence.residual_rows[test]

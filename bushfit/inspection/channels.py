@@ -90,7 +90,11 @@ def odd_recording(
 
 
 def gaps(motion: RecordedChannel, record: Loop) -> Iterator[str]:
-    """Warn of gaps in the recorded time, or in the motion if no time was recorded; one sentence for all."""
+    """Find gaps in the recorded time, or in the motion if no time was recorded.
+
+    Yields:
+        One sentence on the number of gaps, and on the first.
+    """
     steps = np.diff(record.time) if record.has_recorded_time else np.abs(np.diff(motion.values))
     usual = np.median(steps)
     wide = steps > max(_GAP_STEPS * usual, _GAP_WIDEST_STEPS * np.quantile(steps, 0.99))  # gaps left out
@@ -108,7 +112,11 @@ def gaps(motion: RecordedChannel, record: Loop) -> Iterator[str]:
 
 
 def stuck_rows(motion: RecordedChannel, force: RecordedChannel) -> Iterator[str]:
-    """Warn of rows in which the recorder repeats its values although the motion continued; one sentence."""
+    """Find rows in which the recorder repeats its values although the motion continued.
+
+    Yields:
+        One sentence on the longest run of such rows.
+    """
     moves = (np.diff(motion.values) != 0.0) | (np.diff(force.values) != 0.0)
     last, smallest = motion.values.size - 1, _STUCK_MOTION * np.ptp(motion.values)
     stuck = [
@@ -123,7 +131,11 @@ def stuck_rows(motion: RecordedChannel, force: RecordedChannel) -> Iterator[str]
 
 
 def cut_off_ends(channel: RecordedChannel) -> Iterator[str]:
-    """Warn of a channel that is clipped at its largest or smallest value; one sentence for each end."""
+    """Find a channel that is clipped at its largest or smallest value.
+
+    Yields:
+        One sentence for each end.
+    """
     values, span = channel.values, float(np.ptp(channel.values))
     rounding, steps = 1e-9 * span, np.abs(np.diff(values))
     finest = float(steps[steps > rounding].min(initial=span))
@@ -138,7 +150,11 @@ def cut_off_ends(channel: RecordedChannel) -> Iterator[str]:
 
 
 def single_outliers(channel: RecordedChannel, record: Loop) -> Iterator[str]:
-    """Warn of single rows of a channel that are far from their neighbours; one sentence, which lists three rows."""
+    """Find single rows of a channel that are far from their neighbours.
+
+    Yields:
+        One sentence, which lists the first three rows.
+    """
     rows = np.flatnonzero(lone_outliers(record.time, channel.values))
     if rows.size:
         listed = ", ".join(

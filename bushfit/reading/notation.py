@@ -23,7 +23,10 @@ def find_first_decimal(table: Table) -> str | None:
 
 
 def find_numerals(table: Table) -> Numerals:
-    """Notation of the numbers in the columns whose quantity is known.
+    """Find the notation of the numbers in the columns whose quantity is known.
+
+    Returns:
+        Decimal mark and thousands separator.
 
     Raises:
         MeasurementError: the numbers have two notations, or can be read in two ways.

@@ -43,7 +43,13 @@ class Preload(NamedTuple):
 
 
 def add_preload(text: str, preload: Preload | None, place: Place) -> str:
-    """Add the preload, if it is known, to the text on a test or prediction: "axial at a preload of 500 N"."""
+    """Add the preload to the text on a test or prediction, as in "axial at a preload of 500 N".
+
+    Args:
+        text: text on the test.
+        preload: preload of the test; None leaves the text as it is.
+        place: direction or specimen of the test.
+    """
     return f"{text} at a preload of {preload.text(place)}" if preload else text
 
 
