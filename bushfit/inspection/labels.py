@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from bushfit.geometry import Place
-from bushfit.reading.headers import ZERO_TO_PEAK
+from bushfit.reading.headers import ZERO_TO_PEAK, AmplitudeConvention
 from bushfit.reading.names import Labels, StatedQuantity, labels_in_names
 from bushfit.reading.si_columns import columns_key
 from bushfit.reading.stiffness import hint_for_convertible_columns
@@ -80,17 +80,18 @@ def keys_from_labels(
     """
     written = "from the lines above the table" if table.layout.header_line else "from the properties in the file"
     sources = {"from the name": by_name, written: table.labels_above, "from the other sheets": of_book}
+    in_text = (quantity for line in table.lines_above for quantity in labels_in_names(line.text).quantities)
+    counted = Labels(tuple(quantity for quantity in in_text if quantity.convention))  # "0.4 mm peak-to-peak"
     keys: dict[str, Any] = {}
     facts: dict[str, list[str]] = {}
     has_convention = True
     for key, role in _CONSTANT_ROLES.items() if is_sweep else ():
         if role not in table.roles and key not in test_options:
-            origin, quantity = _constant_quantity(table, place, key, sources)
+            origin, quantity = _constant_quantity(table, place, key, {**sources, "from the text above": counted})
             convention = test_options.get("amplitude") or quantity.convention
             keys[key] = sentence = quantity.text
             if role == "amplitude" and convention in ("peak-to-peak", "rms"):
-                number, _, unit = quantity.text.partition(" ")
-                keys[key] = f"{float(number) * ZERO_TO_PEAK[convention]:.6g} {unit}"
+                keys[key] = _zero_to_peak(quantity.text, convention)
                 factor = "half of" if convention == "peak-to-peak" else "the square root of two times the rms of"
                 sentence = f"{keys[key]}, {factor} {quantity.text}"
             facts.setdefault(origin, []).append(f"{role} {sentence}")
@@ -108,6 +109,12 @@ def keys_from_labels(
             keys[key] = text
             facts.setdefault(origin, []).append(f"{name} {text}")
     return keys, {origin: ", ".join(sentences) for origin, sentences in facts.items()}, has_convention
+
+
+def _zero_to_peak(amplitude: str, convention: AmplitudeConvention | None) -> str:
+    """Convert the text of an amplitude, such as "0.4 mm", to zero-to-peak; without a convention it is zero-to-peak."""
+    size, _, unit = amplitude.partition(" ")
+    return f"{float(size) * ZERO_TO_PEAK[convention or 'zero-to-peak']:.6g} {unit}"
 
 
 def _constant_quantity(
@@ -133,15 +140,16 @@ def _constant_quantity(
     origin, found = next(iter(quantities.items()), ("", []))
     if len(found) == 1:
         return origin, found[0]
+    listed = [f"{quantity.text} {quantity.convention or ''}".rstrip() for quantity in found]
     usual = {"m": "0.1 mm", "Hz": "10 Hz", "1": "0.1 %"}
-    example = found[0].text if found else usual.get(expected, "1 deg")
+    example = _zero_to_peak(found[0].text, found[0].convention) if found else usual.get(expected, "1 deg")
     state = f'state {key} = "{example}" in the campaign'
     if "block" in table.headers:
         state = f'write a [[sweeps]] table for each block with rows = {{ block = "1" }} and {key} = "{example}"'
     other_way = hint_for_convertible_columns(table, {"period"}) if role == "frequency" else None
     raise table.header_error(
         f"the {role} of this test is not stated",
-        found=f"{origin}: {' and '.join(quantity.text for quantity in found)}" if found else None,
+        found=f"{origin}: {' and '.join(listed)}" if found else None,
         expected=f"a column for the {role}, or one number with its unit in the name of the file",
         hint=other_way or f"{state}, or name the column: {columns_key(table, role, expected)}",
     )

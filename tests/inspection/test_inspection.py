@@ -245,6 +245,8 @@ def test_an_amplitude_without_a_column_is_read_from_the_name_unless_stated(
     assert ("from the name" in seen.facts) == ("at_amplitude" not in stated)
     assert (seen.assumed is not None) == (name == "axial_A0,1mm")
     assert bool(seen.odd) == (name == "axial_0.2mm" and "at_amplitude" in stated)
+    (tmp_path / "axial.csv").write_text("Sweep of part 7, 0.2 mm peak-to-peak\n" + file.read_text(encoding="utf-8"))
+    assert inspect_file(tmp_path / "axial.csv", {}).entry == {"at_amplitude": "0.1 mm"}
 
 
 @pytest.mark.parametrize(
