@@ -79,6 +79,7 @@ def loop_harmonics(loop: Loop, frequency: float, cycles: float) -> LoopHarmonics
     phase = (loop.time[chosen] - loop.time[0]) * frequency
     order = resolved_order(loop.time.size / max(cycles, 1.0), _MOST_HARMONICS)
     columns = basis(phase, order)
+    grid = np.arange(GRID + 1) / GRID
     recorded = {"displacement": loop.displacement, "force": loop.force}
     values = np.column_stack([column[chosen] for column in recorded.values()])
     solution, inliers, outliers = least_squares(columns, values), np.empty(values.shape, dtype=bool), {}
@@ -87,7 +88,10 @@ def loop_harmonics(loop: Loop, frequency: float, cycles: float) -> LoopHarmonics
         outliers[name] = _NO_OUTLIERS
         if column.size <= _MOST_ROWS_CHECKED or not inliers[:, i].all():
             residual = values[:, i] - columns @ solution[:, i]
-            outliers[name] = _column_outliers(loop, frequency, column, solution[:, i], residual)
+            cycle = np.interp((loop.time - loop.time[0]) * frequency % 1.0, grid, basis(grid, order) @ solution[:, i])
+            limit = outlier_distance(solution[:, i], residual, column.size)
+            rows = np.flatnonzero(are_outliers(column - cycle, column, limit) | are_stuck(column))
+            outliers[name] = OutlierRows(rows, np.abs((column - cycle)[rows]) / _noise(solution[:, i], residual))
     remainder = values - columns @ solution
     of_motion, of_force = inliers.T
     freedom = np.maximum(np.count_nonzero(inliers, axis=0) - 2 * order - 1, 1)
@@ -186,24 +190,6 @@ def _fit_without_outliers(columns: Array, values: Array, solution: Array) -> tup
             break
         inliers, solution = found, least_squares(columns, values, found)
     return solution, inliers
-
-
-def _column_outliers(loop: Loop, frequency: float, column: Array, solution: Array, residual: Array) -> OutlierRows:
-    """Outliers among all rows of a displacement or force, from harmonics fitted to some of the rows.
-
-    Args:
-        loop: steady cycles of the loop.
-        frequency: frequency of the motion [Hz].
-        column: displacement or force of all n rows, (n,).
-        solution: mean, cosines and sines of the column, (2 order + 1,).
-        residual: residuals of the fitted rows, in the unit of the column.
-    """
-    grid = np.arange(GRID + 1) / GRID
-    cycle = basis(grid, solution.size // 2) @ solution
-    distance = column - np.interp((loop.time - loop.time[0]) * frequency % 1.0, grid, cycle)
-    limit = outlier_distance(solution, residual, column.size)
-    rows = np.flatnonzero(are_outliers(distance, column, limit) | are_stuck(column))
-    return OutlierRows(rows, np.abs(distance[rows]) / _noise(solution, residual))
 
 
 def _inliers(columns: Array, values: Array, solution: Array, stuck: Array) -> Array:

@@ -33,7 +33,7 @@ _DIGITS = 9
 class MeasuredSweep(MeasuredBase):
     """Measured sweep: dynamic stiffness at n points, with residuals in gain and phase.
 
-    `MeasuredLoop` documents the methods that have no explanation here. Points are sorted by run (held value, repeat),
+    `MeasuredBase` documents the methods of every test. Points are sorted by run (held value, repeat),
     then by step; a run is a block. The residual ln(K/K_meas) of model K has the gain error in its real and the phase
     error in its imaginary part.
 

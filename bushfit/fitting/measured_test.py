@@ -19,10 +19,10 @@ from bushfit.reading.measurement import Loop, Source, Sweep
 class MeasuredBase(ABC):
     """One measured test with its noise: a loop from `prepare_loops` or a sweep from `prepare_sweeps`.
 
-    Fits, quality figures, pictures and the diagnosis use both kinds in the same way; `MeasuredLoop` documents the
-    methods. A loop has n points, its rows (or bins of phase, if it is long), and n residuals; a sweep has n operating
-    points and 2 n residuals: all gains, then all phases. Whitened residuals are model minus measured in units of noise,
-    independent and of unit variance if the model is right.
+    Fits, quality figures, pictures and the diagnosis use both kinds in the same way; this class and `MeasuredLoop`
+    document the methods. A loop has n points, its rows (or bins of phase, if it is long), and n residuals; a sweep has
+    n operating points and 2 n residuals: all gains, then all phases. Whitened residuals are model minus measured in
+    units of noise, independent and of unit variance if the model is right.
 
     Args:
         kind: "loop" or "sweep".
