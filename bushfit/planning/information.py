@@ -65,18 +65,18 @@ class ModelInformation:
         products: inner products of the first 2 + k columns with all columns, (tests, 2 + k, 2 + k + e). The columns
             are unit gain error, unit phase error, k parameters, and e departures (missing effects or rival models).
         squares: inner product of the column of each departure with itself, (tests, e).
-        level: standard deviations of the gain [1] and phase [rad] errors that all runs of a test share, the accuracy
-            class of the rig, (tests, 2).
         class_ratios: largest change of the response by each departure at any point of a test, relative to the accuracy
             class, (tests, e).
+        level: standard deviations of the gain [1] and phase [rad] errors that all runs of a test share, the accuracy
+            class of the rig, (2,).
         prior: information matrix of the parameters' relative changes before the tests, (k, k).
         bounded: number of parameters at a bound; these are the last of the k parameters.
     """
 
     products: Array
     squares: Array
-    level: Array
     class_ratios: Array
+    level: Array
     prior: Array
     bounded: int = 0
 
@@ -94,8 +94,8 @@ class ModelInformation:
             deviations T, an inner product a^T b becomes a^T b - a^T U T (1 + T U^T U T)^-1 T U^T b.
         """
         products, k = self.products * counts[:, None, None], len(self.prior)
-        shared = self.level[..., None] * products[..., :2, :]
-        solved = np.linalg.solve(np.eye(2) + shared[..., :2] * self.level[..., None, :], shared)
+        shared = self.level[:, None] * products[..., :2, :]
+        solved = np.linalg.solve(np.eye(2) + shared[..., :2] * self.level, shared)
         remaining = products[..., 2:, 2:] - shared[..., 2 : 2 + k].mT @ solved[..., 2:]
         decrease = np.sum(shared[..., 2 + k :] * solved[..., 2 + k :], axis=-2)
         return Information(remaining, self.squares * counts[:, None] - decrease)
@@ -209,7 +209,7 @@ class CandidateGrid:
         noise, loops = self.knowledge.noise, split_by_kind(self.data_sets)[0]
         scatter, shared = np.array(noise.scatter)[:, None], np.array(noise.shared)[:, None]
         class_errors = np.maximum(noise.level, np.finfo(float).tiny)[:, None]  # of gain and phase
-        products, squares, level, class_ratios = [], [], [], []
+        products, squares, class_ratios = [], [], []
         for test, rows in zip(self.tests, self.rows, strict=True):
             if isinstance(test, SimulatedLoop):
                 unit_gain = loops[rows[0] // _ROWS].gain_and_offset()[0]
@@ -226,9 +226,8 @@ class CandidateGrid:
             products.append(whitened[: 2 + k] @ whitened.T)
             squares.append(np.square(whitened[2 + k :]).sum(axis=1))
             class_ratios.append((np.abs(departures[:, rows]) / unit).reshape(len(departures), -1).max(axis=1))
-            level.append((noise.level[0], 0.0 if isinstance(test, SimulatedLoop) else noise.level[1]))
-        tests = (np.array(products), np.array(squares), np.array(level), np.array(class_ratios))
-        return ModelInformation(*tests, knowledge.precision, len(knowledge.bounded))
+        tests = np.array(products), np.array(squares), np.array(class_ratios)
+        return ModelInformation(*tests, np.array(noise.level), knowledge.precision, len(knowledge.bounded))
 
     def effect_columns(self) -> tuple[list[Effect], Array]:
         """Compute the changes of the residuals by effects of the library that the model lacks.
