@@ -202,7 +202,7 @@ class DiagnosisFile(TypedDict):
         description: power law nearest to a gap that no known effect explains; null without such a gap.
         gap: misfit between model and tests, before and after the additions.
         validation: validation records of the campaign; missing without any.
-        usable: expected error of model.json; null if nothing was fitted.
+        usable: expected error of model.json; null for fewer than five fitted points.
         next_test: test that would decide between the explanations or confirm the verdict; empty without one.
         warnings: warnings on the tests, the fit and the model to use.
     """

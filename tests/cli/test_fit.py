@@ -232,6 +232,7 @@ def test_one_loop_alone_is_fitted_and_what_it_leaves_open_is_said_first(own, tmp
     fitted = typing(own)("fit", CAMPAIGN, "-o", tmp_path / "fit", "--no-plots", "--json")
     assert fitted.stderr.startswith(f"CMP 15 961: {UNKNOWN}\n")
     assert json.loads(fitted.stdout)["warnings"][0] == UNKNOWN
+    assert "expected error" not in ran.stderr + fitted.stderr, "five parameters pass through one point"
 
 
 @pytest.mark.parametrize(
