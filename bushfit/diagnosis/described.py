@@ -86,7 +86,7 @@ def describe(
     if NAME in evidence.model.effects:
         return None
     law, harmonic = None, tuple(test.fundamental() for test in evidence.data_sets)
-    fitted, correction = with_model_error(evidence.solution, bounds, smooth=True, certain=has_candidates)
+    fitted, correction = with_model_error(evidence.solution, bounds, rig, smooth=True, certain=has_candidates)
     if correction is None or correction.uncertainty >= 1.0:
         return None
     half = Z95 * correction.uncertainty * correction.largest

@@ -2,7 +2,7 @@
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -12,8 +12,9 @@ from bushfit.fitting.agreement import expected_errors
 from bushfit.fitting.assess import temperature_warning
 from bushfit.fitting.coordinates import Bounds
 from bushfit.fitting.descent import Descent
-from bushfit.fitting.model_error import model_error_warning, with_model_error
-from bushfit.fitting.preparation import MeasuredTest
+from bushfit.fitting.levels import LevelErrors
+from bushfit.fitting.model_error import with_excess_errors
+from bushfit.fitting.preparation import MeasuredTest, with_level_errors
 from bushfit.fitting.problem import FitProblem, FitResult
 from bushfit.fitting.procedures import build_result
 from bushfit.model.covariance import Covariance
@@ -147,7 +148,7 @@ def result_of(
         bounds: limits of parameters inside their general limits.
         resolved: names of effects known to belong to the bushing and not to the rig; the model's other effects with a
             twin in the rig are reported as unresolved.
-        lacking: True if the model lacks something, so that a smooth error of the model is estimated.
+        lacking: False if the tests contain a mistake in their record, so that no error of the model is estimated.
         corrected: fit together with a smooth correction of the model; None if the model has no correction.
         rig: stated accuracy class of the rig (gain and phase errors).
         fixed: covariance of parameters that the fit kept fixed; None if these are exact.
@@ -155,15 +156,14 @@ def result_of(
     Returns:
         The model with covariance, quality, range, warnings and expected error.
     """
-    model, solution, error = evidence.model, evidence.solution, None
+    model, solution, error, misses = evidence.model, evidence.solution, None, list[str]()
     if corrected:
         solution = replace(corrected, noise_weighted=evidence.data_sets)
     elif lacking:
-        solution, error = with_model_error(solution, bounds, rig)
+        solution, error, misses = with_excess_errors(solution, bounds, rig, partial(_with_levels, solution))
         model = solution.model
     notes = (
-        *([_CORRECTED] if corrected else []),
-        *([model_error_warning(error)] if error else []),
+        *([_CORRECTED] if corrected else misses),
         *temperature_warning(model, evidence.data_sets),
     )
     return replace(
@@ -173,3 +173,9 @@ def result_of(
         model_error=error,
         unresolved=tuple(effect.name for effect in model.records if effect.twins and effect.name not in resolved),
     )
+
+
+def _with_levels(solution: FitResult, errors: LevelErrors) -> FitResult:
+    """Repeat a fit with errors that all runs of a level share in the noise."""
+    tests = with_level_errors(solution.problem.tests, errors.error, errors.freedom)
+    return Descent.start(replace(solution.problem, model=solution.model, tests=tests)).run(EVALUATIONS).solution

@@ -23,6 +23,7 @@ from scipy.special import bdtrc
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.groups import Group
 from bushfit.effects.contract import Array
+from bushfit.fitting.discrepancy import COMPOUND_LENGTHS
 from bushfit.fitting.loop_harmonics import SMOOTH_HARMONICS
 from bushfit.fitting.preparation import (
     SAME_LOOP,
@@ -33,7 +34,7 @@ from bushfit.fitting.preparation import (
     split_by_kind,
 )
 from bushfit.gaussian_process import coordinates, in_lengths, matern, patterns
-from bushfit.geometry import Place
+from bushfit.geometry import Place, stiffness_per_modulus
 from bushfit.model.model import Model
 from bushfit.model.result import Outlier
 from bushfit.reading.measurement import SAME_TEMPERATURE
@@ -41,9 +42,8 @@ from bushfit.reduction.harmonics import basis
 
 #: Name of the compound's own deviation among explanations without a name.
 COMPOUND = "compound"
-#: Correlation lengths of the compound's deviation in ln frequency and ln strain: relaxation takes decades of frequency,
-#: and breakdown more than one of strain. Number of its patterns: with three to five levels more improve nothing.
-_COMPOUND_LENGTHS, _COMPOUND_PATTERNS = (8.0, 3.0), 12
+#: Number of patterns of the compound's deviation: with three to five levels more improve nothing.
+_COMPOUND_PATTERNS = 12
 #: Fraction of the compound's deviation that changes over the shorter lengths of a smooth curve: yield and breakdown set
 #: in within a factor of 2 or 3 of the strain.
 _COMPOUND_ROUGHNESS = 0.25
@@ -58,6 +58,8 @@ _PHASES = 32
 #: Error of ln strain in one direction over the deviation of the compound: 10 % beside the usual 2 %, because one strain
 #: stands for an uneven field; and step of ln strain in difference quotients.
 _STRAIN_ERROR, _STRAIN_STEP = 5.0, 1e-3
+#: Loss modulus of relaxation faster than the tests, at their highest frequency, over the deviation of the compound.
+_FAST_RELAXATION = 1.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -216,7 +218,7 @@ def outlier_clusters(
     return found
 
 
-def compound(evidence: Evidence, count: int = _COMPOUND_PATTERNS) -> Group | None:
+def compound(evidence: Evidence, count: int = _COMPOUND_PATTERNS, *, fast: bool = False) -> Group | None:
     """Changes of the residuals by a compound whose modulus deviates smoothly from the model's laws.
 
     The relative deviation is a random function of frequency and strain, the same in all directions and specimens.
@@ -224,6 +226,7 @@ def compound(evidence: Evidence, count: int = _COMPOUND_PATTERNS) -> Group | Non
     Args:
         evidence: fitted model and tests.
         count: maximum number of patterns.
+        fast: True to include relaxation faster than the tests, which differs little from a delay.
 
     Returns:
         Group of independent patterns of the deviation, of unit variance at each operating point, and of deviations of
@@ -232,8 +235,9 @@ def compound(evidence: Evidence, count: int = _COMPOUND_PATTERNS) -> Group | Non
     if not evidence.data_sets:
         return None
     limits = {"count": count, "correlate": _compound_correlation}
-    columns, changes = _smooth_changes(evidence, evidence.data_sets, _COMPOUND_LENGTHS, **limits)
-    columns, changes = map(np.concatenate, zip((columns, changes), _strain_changes(evidence), strict=True))
+    columns, changes = _smooth_changes(evidence, evidence.data_sets, COMPOUND_LENGTHS, **limits)
+    parts = [(columns, changes), _strain_changes(evidence), *([_fast_relaxation(evidence)] if fast else [])]
+    columns, changes = map(np.concatenate, zip(*parts, strict=True))
     for loops in group_repeats(split_by_kind(evidence.data_sets)[0]):
         columns = np.concatenate((columns, _repeat_changes(evidence, loops, compound_shapes)))
     unit = np.zeros((len(columns), changes.shape[-1]), dtype=complex)
@@ -264,6 +268,24 @@ def _strain_changes(evidence: Evidence) -> tuple[Array, Array]:
     return columns, np.concatenate(changes, axis=-1)
 
 
+def _fast_relaxation(evidence: Evidence) -> tuple[Array, Array]:
+    """Changes by relaxation that is faster than the tests, as `_smooth_changes` returns them, for one amount.
+
+    Far below its own frequency, a relaxation is a loss modulus that grows as the frequency, like the phase of a delay.
+    The amount is relative to the median modulus |K|/(stiffness per modulus) at the highest frequency.
+    """
+    model, tests = evidence.model, evidence.data_sets
+    highest = max(float(test.frequency.max()) for test in tests)
+    factors = [stiffness_per_modulus(model.bushing, test.direction) for test in tests]
+    modulus = np.median(np.concatenate([np.abs(test.measured) / k for test, k in zip(tests, factors, strict=True)]))
+    columns, changes = np.zeros((1, evidence.residual.size)), list[Array]()
+    for test, factor in zip(tests, factors, strict=True):
+        change = _FAST_RELAXATION * 1j * modulus * factor * test.frequency[None] / highest
+        columns[:, evidence.residual_rows[test]] = test.residual_change(change, model)
+        changes.append(change / model.stiffness(test.direction, test.frequency, test.amplitude, kind=test.kind))
+    return columns, np.concatenate(changes, axis=-1)
+
+
 def _compound_correlation(points: Array, nodes: Array) -> Array:
     """Correlation of the compound's deviation at points, (n, 2), with that at nodes, (m, 2); (n, m).
 
@@ -272,7 +294,7 @@ def _compound_correlation(points: Array, nodes: Array) -> Array:
     >>> _compound_correlation(np.zeros((1, 2)), np.array([[0.0, 0.0], [0.0, 0.4]])).round(3)
     array([[1.   , 0.862]])
     """
-    ratio, share = np.divide(_COMPOUND_LENGTHS, _CURVE_LENGTHS["smooth"]), _COMPOUND_ROUGHNESS**2
+    ratio, share = np.divide(COMPOUND_LENGTHS, _CURVE_LENGTHS["smooth"]), _COMPOUND_ROUGHNESS**2
     return (matern(points, nodes) + share * matern(points * ratio, nodes * ratio)) / (1.0 + share)
 
 

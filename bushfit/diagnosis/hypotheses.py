@@ -312,7 +312,9 @@ class SearchState:
         They include what the rig's errors and a deviation of the compound in all its patterns could imitate.
         """
         solution, values = self.bare.solution, self.bare.model.values
-        linear = replace(self.linear, compound=compound(self.bare, MAXIMUM_NODES), chosen_cases=self._likely_cases)
+        linear = replace(
+            self.linear, compound=compound(self.bare, MAXIMUM_NODES, fast=True), chosen_cases=self._likely_cases
+        )
         moves = np.isfinite([self.precision.get(name, 0.0) for name in solution.coordinates.names])
         slopes, count = solution.coordinates.slopes(values)[moves], np.count_nonzero(moves)
         names = tuple(np.array(solution.coordinates.names)[moves].tolist())

@@ -268,11 +268,13 @@ class DiagnosisWriter:
             )
         if places and places.faulty_parts:
             next_test = f"measure again: {places.faulty_parts[0].name}"
-        lacking = verdict in ("partly", "ambiguous", "unexplained") and not (self.first and self.first.best.claim)
+        lacking = not (self.first and self.first.best.claim)
         resolved, corrected = {*base.model.effects} - {*self.request.settings.unresolved}, gap.fitted if gap else None
         regions = tuple(sorted((*at_fault, *find_regions(base)), key=lambda region: -region.excess))
         odds = explanation_odds(self.finding)
-        result = odds.averaged(result_of(after, bounds, resolved, lacking=lacking, corrected=corrected, fixed=known))
+        rig = self.request.data.campaign.rig
+        fitted = result_of(after, bounds, resolved, lacking=lacking, corrected=corrected, rig=rig, fixed=known)
+        result = odds.averaged(fitted)
         amounts = filter(None, (_format_amount(entry.name, result) for entry in entries))
         return Diagnosis(
             verdict,

@@ -28,6 +28,9 @@ from bushfit.model.covariance import Z95
 SIZES = np.geomspace(1e-3, 0.4, 25)
 #: Candidate lengths, in ln frequency and in ln strain: from the distance of neighbouring points to a decade.
 OVER_FREQUENCY, OVER_STRAIN = (0.15, 0.4, 0.9, 2.0), (0.4, 0.9, 2.0)
+#: Lengths of the deviation of a rubber from a few parameters: relaxation takes decades of frequency, and breakdown more
+#: than one of strain.
+COMPOUND_LENGTHS = (8.0, 3.0)
 #: Smallest likelihood, relative to the largest, of a process that enters the average; chosen for time.
 _COUNTS = 0.05
 #: Smallest number of degrees of freedom of a size: Student's t of fewer has no variance.

@@ -17,7 +17,7 @@ Notes:
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 
@@ -32,6 +32,7 @@ from bushfit.fitting.assess import excess_chi_square
 from bushfit.fitting.coordinates import ROUNDING, Bounds, Coordinates, prior_covariance, prior_rows
 from bushfit.fitting.descent import TOLERANCE, Descent
 from bushfit.fitting.discrepancy import (
+    COMPOUND_LENGTHS,
     OVER_FREQUENCY,
     OVER_STRAIN,
     SIZES,
@@ -40,10 +41,10 @@ from bushfit.fitting.discrepancy import (
     averaged,
     discrepancies,
 )
-from bushfit.fitting.levels import level_error_columns
+from bushfit.fitting.levels import LevelErrors, level_error_columns, level_errors
 from bushfit.fitting.preparation import MeasuredLoop, MeasuredTest, residual_slices, split_by_kind
 from bushfit.fitting.problem import FitProblem, FitResult, SmoothError
-from bushfit.fitting.rig_class import class_errors
+from bushfit.fitting.rig_class import class_errors, format_class_errors, largest_error
 from bushfit.fitting.shared_errors import SharedErrors
 from bushfit.fitting.starts import start_values
 from bushfit.gaussian_process import MAXIMUM_NODES, RestrictedLikelihood
@@ -67,6 +68,39 @@ _MIDDLING, _SHOWS, _FEW = (0.9, 2.0), 0.5, 16
 _MAXIMUM_ROUNDS, _SETTLED = 12, 0.02
 
 
+def with_excess_errors(
+    plain_fit: FitResult, bounds: Bounds, rig: RigSettings, refit: Callable[[LevelErrors], FitResult]
+) -> tuple[FitResult, Unnamed | None, list[str]]:
+    """Add to a fit the errors that its tests show beyond the noise: of the model, or of levels.
+
+    If levels disagree by more than chance explains, the rig or the model is the cause, and the fit includes both.
+
+    Args:
+        plain_fit: least-squares fit with the noise alone.
+        bounds: limits of parameters [SI], inside their default limits.
+        rig: accuracy class of the rig.
+        refit: function that repeats the fit with errors of levels in the noise.
+
+    Returns:
+        The fit; the error of the model as a correction of the stiffness, or None; and a warning if the model misses.
+    """
+    found, error = with_model_error(plain_fit, bounds, rig)
+    if error or not found.names:
+        text = f"the model misses the tests by {number(100.0 * error.rms, 2)} %" if error else ""
+        rest = "; parameters are the closest fit, and their intervals include this misfit"
+        return found, error, [text + rest] if error else []
+    errors = level_errors(found.problem.tests, found.residual, found.jacobian, largest_error(rig))
+    if errors.freedom and any(errors.error):
+        found = refit(errors)
+    if errors.significant:
+        found, error = with_model_error(found, bounds, certain=True)
+    text = (
+        f"levels disagree by more than their repeats, as by an error of {format_class_errors(errors.error)} for each "
+        "level: parameters are the closest fit, and their intervals include this error"
+    )
+    return found, error, [text] if error else []
+
+
 def with_model_error(
     plain_fit: FitResult, bounds: Bounds, rig: RigSettings = UNSTATED, *, smooth: bool = False, certain: bool = False
 ) -> tuple[FitResult, Unnamed | None]:
@@ -85,7 +119,7 @@ def with_model_error(
     """
     if not plain_fit.names:
         return plain_fit, None
-    if not certain and (smooth or not _exceeds_noise(plain_fit, rig)):
+    if not (certain or (not smooth and _exceeds_noise(plain_fit, rig))):
         thinned = _thinned(plain_fit.problem.tests)
         rig_errors = [_errors_of_class(test, rig) for test in thinned]
         if not _is_smooth(FittedTests(plain_fit.reevaluate(plain_fit.model, thinned), rig_errors)):
@@ -230,14 +264,6 @@ def log_likelihood(solution: FitResult, prior_precision: Mapping[str, float]) ->
     return gain - 0.5 * (float(residual @ residual) + log_size)
 
 
-def model_error_warning(error: Unnamed) -> str:
-    """Warning that the model misses its tests, with the rms correction of the stiffness in per cent of |K|."""
-    return (
-        f"the model misses the tests by {number(100.0 * error.rms, 2)} %; parameters are the closest fit, and "
-        "their intervals include this misfit"
-    )
-
-
 def _exceeds_noise(solution: FitResult, rig: RigSettings) -> bool:
     """True if chi-square of all tests, or of one, exceeds that of noise and errors of the rig's accuracy class."""
     squares, counts = [], [test.residual_count for test in solution.problem.tests]
@@ -252,6 +278,9 @@ def _exceeds_noise(solution: FitResult, rig: RigSettings) -> bool:
 def _is_smooth(tests: FittedTests) -> bool:
     """True if a smooth error of the model is more probable than noise and errors of the rig's class alone."""
     names = tuple(dict.fromkeys(tests.directions.tolist()))
+    compound = Discrepancy.over_tests(tests, (names,), COMPOUND_LENGTHS, _FEW)
+    if compound.best[0] > _SHOWS and compound.likelihood.log_evidence(SIZES) > 0.0:  # as probable before as its absence
+        return True
     quick = [Discrepancy.over_tests(tests, (names,), _MIDDLING, _FEW)]
     if tests.directions.size > _DENSE:
         quick.append(Discrepancy.over_tests(tests, (names,), (OVER_FREQUENCY[0], OVER_STRAIN[-1]), MAXIMUM_NODES))

@@ -24,14 +24,13 @@ from bushfit.fitting.assess import (
 )
 from bushfit.fitting.coordinates import Bounds, Coordinates
 from bushfit.fitting.identify import undetermined_parameters
-from bushfit.fitting.levels import level_errors
-from bushfit.fitting.model_error import model_error_warning, with_model_error
+from bushfit.fitting.levels import LevelErrors
+from bushfit.fitting.model_error import with_excess_errors
 from bushfit.fitting.preload import PRELOAD, other_line
 from bushfit.fitting.preparation import MeasuredTest, sources, with_level_errors
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.problem import FitResult
 from bushfit.fitting.profile import limit95, profile95
-from bushfit.fitting.rig_class import format_class_errors, largest_error
 from bushfit.fitting.robust import estimate, outlier_warnings
 from bushfit.geometry import get_places
 from bushfit.model.covariance import Covariance
@@ -97,21 +96,13 @@ def fit_joint(
     unused = [test for test in data.data_sets if test not in tests]
     problem = data.problem(effects, tests, {})
     found = estimate(problem, robust=data.robust)
-    rig = data.campaign.rig
-    errors = level_errors(found.problem.tests, found.residual, found.jacobian, largest_error(rig))
-    found, error = with_model_error(found, data.bounds, rig)
-    notes = [model_error_warning(error) + NEXT] if error else []
-    if errors.freedom and any(errors.error) and not error:
-        tests = with_level_errors(tests, errors.error, errors.freedom)
-        found = estimate(replace(problem, model=found.model, tests=tests), robust=data.robust)
-    if errors.significant and found.names and not error:  # the rig or the model is the cause: the bands include both
-        found, error = with_model_error(found, data.bounds, certain=True)
-        if error:
-            size = format_class_errors(errors.error)
-            notes.append(
-                f"levels disagree by more than their repeats, as by an error of {size} for each level: parameters are "
-                "the closest fit, and their intervals include this error"
-            )
+
+    def refit(errors: LevelErrors) -> FitResult:
+        with_errors = with_level_errors(tests, errors.error, errors.freedom)
+        return estimate(replace(problem, model=found.model, tests=with_errors), robust=data.robust)
+
+    found, error, notes = with_excess_errors(found, data.bounds, data.campaign.rig, refit)
+    notes = [note + NEXT for note in notes]
     notes += unfitted_warnings(found.model, unused, NEXT)
     usable = expected_errors(found.model, found.problem.tests, unused, found)
     result = _result(data, [found], notes=notes, unused=unused)
