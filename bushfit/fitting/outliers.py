@@ -11,7 +11,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from scipy.special import chdtri, fdtri
 
 from bushfit.effects.contract import Array
-from bushfit.reduction.arrays import MEDIAN_TO_SIGMA, median
+from bushfit.reduction.arrays import difference_noise, median
 
 #: Probability that noise alone makes an outlier among all rows of a test; chosen: one test in a hundred.
 _CHANCE = 0.01
@@ -96,8 +96,7 @@ def are_stuck(recorded: Array) -> Array:
     by_chance = max(int(np.count_nonzero(equal & (runs < _STUCK - 1))), 1) / recorded.size
     unlikely = (runs >= _STUCK - 1) & (recorded.size * by_chance ** np.minimum(runs, 99) < _CHANCE)
     if unlikely.any():
-        bends = np.diff(recorded[:_NOISE_ROWS], 2)  # of white noise they have six times the variance
-        noise = MEDIAN_TO_SIGMA * (float(np.median(np.abs(bends))) / np.sqrt(6.0))
+        noise = float(difference_noise(recorded[:_NOISE_ROWS], 2))
         unlikely &= noise > _LEAST_NOISE * float(np.ptp(recorded))
     return np.append(False, unlikely)
 
