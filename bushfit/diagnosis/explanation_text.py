@@ -22,16 +22,10 @@ LEVELS = "errors of levels beyond the class of the rig"
 _LESS_LIKELY = "another explanation is more probable"
 
 
-def reported_names(composition: Composition) -> list[str]:
-    """Names of the mistakes in the record (as --adopt accepts them) and effects of an explanation."""
-    claim = composition.best.claim
-    return [*(claim.labels if claim else ()), *composition.names]
-
-
 def label(composition: Composition) -> str:
-    """Name of an explanation: its mistakes, effects, faulty parts of the tests and other parts, joined by " + "."""
-    faults = (f"fault: {part.name}" for part in composition.faulty_parts)
-    return " + ".join((*reported_names(composition), *faults, *_nameless(composition)))
+    """Name of an explanation: its mistakes (as --adopt accepts them), effects, faults and other parts, joined by +."""
+    claim, faults = composition.best.claim, (f"fault: {part.name}" for part in composition.faulty_parts)
+    return " + ".join((*(claim.labels if claim else ()), *composition.names, *faults, *_nameless(composition)))
 
 
 def _nameless(composition: Composition) -> list[str]:

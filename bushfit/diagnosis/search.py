@@ -18,9 +18,10 @@ import numpy as np
 from bushfit.diagnosis.claims import ClaimScreening, claims
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.explanations import COMPOUND, Explanation, FaultyPart
-from bushfit.diagnosis.hypotheses import DiagnosisRequest, Hypothesis, SearchState, Tests
+from bushfit.diagnosis.hypotheses import DiagnosisRequest, Hypothesis, SearchState
 from bushfit.diagnosis.priors import BEAM, DOES_NOT_FIT, LOG_ODDS_CUTOFF, NAMED, ODDS, REFITS, ROUNDS
 from bushfit.diagnosis.propose import has_used_parameters
+from bushfit.diagnosis.recorded_tests import Tests
 from bushfit.diagnosis.refit import refitted
 from bushfit.diagnosis.rig_errors import in_scatter_units
 from bushfit.diagnosis.verdict import decide_verdict

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
-from itertools import combinations, product
-from typing import NamedTuple
+from itertools import combinations
+from typing import Any
 
 import numpy as np
 from scipy.special import logsumexp
@@ -17,6 +17,10 @@ from bushfit.diagnosis.hypotheses import Hypothesis
 from bushfit.diagnosis.priors import DOES_NOT_FIT, LEAST_NAMED_SHARE, MOST_REPORTED, NAMED, NOTHING
 from bushfit.effects import get_effect
 from bushfit.effects.contract import Level
+
+#: Part of an explanation: its kind ("effect", "mistake", "unnamed", or `_FAULT` and the kind of a fault), and its name.
+_Part = tuple[str, Any]
+_FAULT = "fault: "
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,48 +163,20 @@ def _leads(pairs: Sequence[tuple[Hypothesis, float]]) -> tuple[str, ...]:
     return tuple(name for name in pairs[0][0].effects if share[name] >= LEAST_NAMED_SHARE * total)
 
 
-class _Parts(NamedTuple):
-    """Effects, faults and mistake of a hypothesis; hypotheses with equal parts are merged into one explanation.
+def _parts_of(hypothesis: Hypothesis) -> frozenset[_Part]:
+    """List the parts of a hypothesis; hypotheses with equal parts are merged into one explanation.
 
-    Args:
-        effects: names of the effects.
-        faulty_parts: faulty parts as "kind:name".
-        only_unnamed: True if a curve without a name, or a pattern of faulty parts, is the only part.
-        claim: key of the mistake in the record; None without a mistake.
+    Effects of the rubber are not listed if a deviation of the compound could imitate them. A curve without a name, or a
+    pattern of faulty parts of the tests, is listed only if there is nothing else.
     """
-
-    effects: frozenset[str]
-    faulty_parts: frozenset[str]
-    only_unnamed: bool
-    claim: Hashable
-
-    @classmethod
-    def of_hypothesis(cls, hypothesis: Hypothesis) -> _Parts:
-        """Parts of a hypothesis; without effects of the rubber if a deviation of the compound could imitate them."""
-        effects = frozenset(
-            name
-            for name in hypothesis.effects
-            if not (hypothesis.compound_deviates and get_effect(name).level == Level.MATERIAL)
-        )
-        pattern = is_pattern(hypothesis.faulty_parts)
-        faulty_parts = [f"{part.family}:{part.name}" for part in hypothesis.faulty_parts] + [
-            "levels:"
-        ] * hypothesis.levels
-        faulty_parts = [] if pattern else faulty_parts
-        claim = hypothesis.claim and hypothesis.claim.key
-        only_unnamed = (pattern or bool(hypothesis.unnamed)) and not (effects or faulty_parts or claim)
-        return cls(effects, frozenset(faulty_parts), only_unnamed, claim)
-
-    def simpler(self) -> set[_Parts]:
-        """All simpler sets of parts: non-empty subsets, and the set with each effect replaced by its simpler limit."""
-        reduced = product(_subsets(self.effects), _subsets(self.faulty_parts), [False], {None, self.claim})
-        limit = self._replace(effects=frozenset(get_effect(name).limit or name for name in self.effects))
-        return {parts for parts in (*map(_Parts._make, reduced), limit) if any(parts)} - {self}
-
-
-def _subsets(names: frozenset[str]) -> list[frozenset[str]]:
-    """All subsets of a set of names, from the empty set to the set itself."""
-    return [frozenset(chosen) for count in range(len(names) + 1) for chosen in combinations(names, count)]
+    nameless = Level.MATERIAL if hypothesis.compound_deviates else None
+    parts: list[_Part] = [("effect", name) for name in hypothesis.effects if get_effect(name).level != nameless]
+    pattern = is_pattern(hypothesis.faulty_parts)
+    if not pattern:
+        parts += [(f"{_FAULT}{part.family}", part.name) for part in hypothesis.faulty_parts]
+        parts += [(f"{_FAULT}levels", "")] * hypothesis.levels
+    parts += [("mistake", hypothesis.claim.key)] if hypothesis.claim else []
+    return frozenset(parts or ([("unnamed", "")] if pattern or hypothesis.unnamed else []))
 
 
 def compose(pairs: Sequence[tuple[Hypothesis, float]]) -> list[Composition]:
@@ -215,30 +191,29 @@ def compose(pairs: Sequence[tuple[Hypothesis, float]]) -> list[Composition]:
     Returns:
         Explanations, the most probable first, whose probabilities sum to one.
     """
-    best: dict[_Parts, Hypothesis] = {}
-    total: dict[_Parts, float] = defaultdict(float)
-    unnamed: dict[_Parts, float] = defaultdict(float)
+    best: dict[frozenset[_Part], Hypothesis] = {}
+    total, unnamed, merged = (defaultdict[frozenset[_Part], float](float) for _ in range(3))
     for hypothesis, weight in pairs:
-        parts = _Parts.of_hypothesis(hypothesis)
+        parts = _parts_of(hypothesis)
         if parts not in best or (hypothesis.refitted and not best[parts].refitted):
             best[parts] = hypothesis
         total[parts] += weight
         unnamed[parts] += weight * (bool(hypothesis.unnamed) or is_pattern(hypothesis.faulty_parts))
-    merged: dict[_Parts, float] = defaultdict(float)
     order = {parts: rank for rank, parts in enumerate(sorted(total, key=lambda parts: -total[parts]))}
     for parts in order:
-        simpler = parts.simpler() & merged.keys()
-        merged[min(simpler, key=order.__getitem__) if simpler else parts] += total[parts]
-    kinds: dict[Hashable, list[_Parts]] = defaultdict(list)
+        subsets = (frozenset(chosen) for count in range(1, len(parts)) for chosen in combinations(parts, count))
+        limit = frozenset((kind, (kind == "effect" and get_effect(name).limit) or name) for kind, name in parts)
+        simpler = merged.keys() & {*subsets, limit}
+        merged[min(simpler, key=order.__getitem__, default=parts)] += total[parts]
+    kinds = defaultdict[Hashable, list[frozenset[_Part]]](list)
     for parts in sorted(merged, key=lambda parts: -merged[parts]):
-        families = frozenset(part.partition(":")[0] for part in parts.faulty_parts)
-        kinds[parts._replace(faulty_parts=families)].append(parts)
+        kinds[frozenset((kind, "" if kind.startswith(_FAULT) else name) for kind, name in parts)].append(parts)
     whole = sum(merged.values())
     compositions = [
         Composition(
             sum(merged[parts] for parts in members) / whole,
             best[members[0]],
-            tuple(name for name in best[members[0]].effects if name in members[0].effects),
+            tuple(name for name in best[members[0]].effects if ("effect", name) in members[0]),
             unnamed[members[0]] > 0.5 * total[members[0]],
         )
         for members in kinds.values()

@@ -1,0 +1,75 @@
+"""Tests as recorded, or with a corrected record, and what may explain a gap in them independently of the model."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+from bushfit.campaign.schema import RigSettings
+from bushfit.diagnosis.claims import Claim
+from bushfit.diagnosis.evidence import Evidence
+from bushfit.diagnosis.explanations import Explanation, FaultyPart, compound, unnamed_curves
+from bushfit.diagnosis.faulty_parts import find_faulty_parts
+from bushfit.diagnosis.groups import Group
+from bushfit.diagnosis.rig_errors import RigErrors, in_scatter_units, rig_errors
+
+
+@dataclass(frozen=True, eq=False)
+class Tests:
+    """Tests as recorded, or with one mistake in the record corrected, with the starting model fitted to them.
+
+    Args:
+        base: fit of the starting model; its residuals are whitened by scatter and by errors that points share.
+        rig: stated accuracy class of the rig (gain and phase errors).
+        without: names of effects not to consider.
+        log_prior: natural log of the prior probability that these are the right records and nothing is missing.
+        claim: mistake that is corrected; None for the tests as recorded.
+        change: relative change of the recorded quantities by the correction; 0 for the tests as recorded.
+    """
+
+    base: Evidence
+    rig: RigSettings
+    without: Sequence[str]
+    log_prior: float
+    claim: Claim | None = None
+    change: float = 0.0
+
+    @cached_property
+    def bare(self) -> Evidence:
+        """Fit of the starting model with residuals in units of the scatter from point to point, to compare hypotheses.
+
+        Errors that points share are not part of this unit; `errors` describes them.
+        """
+        return in_scatter_units(self.base)
+
+    @cached_property
+    def errors(self) -> RigErrors:
+        """Errors of the rig that points share, as changes of residuals in units of the scatter from point to point."""
+        return rig_errors(self.bare, self.rig)
+
+    @cached_property
+    def compound(self) -> Group | None:
+        """Changes of the residuals (in units of the scatter) by a smooth deviation of the rubber from the model's laws.
+
+        They are used to compare hypotheses; None without tests.
+        """
+        return compound(self.bare)
+
+    @cached_property
+    def compound_in_fits(self) -> Group | None:
+        """Changes of the residuals (whitened as in a fit) by a smooth deviation of the rubber from the model's laws.
+
+        A refit with an effect also estimates the amounts of these changes, without a prior; None without tests.
+        """
+        return compound(self.base)
+
+    @cached_property
+    def faulty_parts_in_fits(self) -> dict[str, FaultyPart]:
+        """Faulty parts by name, with the residuals that a fit minimises in place of those in units of the scatter."""
+        return {part.name: part for part in find_faulty_parts(self.base)}
+
+    @cached_property
+    def explanations(self) -> list[Explanation]:
+        """Explanations of the gap that are independent of the model's effects: faulty test parts, and smooth curves."""
+        return [*find_faulty_parts(self.bare), *unnamed_curves(self.bare)]
