@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+
 from bushfit.diagnosis.described import GapDescription, describe
 from bushfit.diagnosis.document import Verdict
 from bushfit.diagnosis.evidence import Evidence, fit, result_of
@@ -23,7 +25,7 @@ from bushfit.diagnosis.holdout import HoldOut, hold_out
 from bushfit.diagnosis.hypotheses import DiagnosisRequest, Hypothesis, mean_parameters
 from bushfit.diagnosis.locate import find_regions
 from bushfit.diagnosis.next_test import deciding_test
-from bushfit.diagnosis.priors import LARGEST_CLOSED_GAP
+from bushfit.diagnosis.priors import LARGEST_CLOSED_GAP, NAMED
 from bushfit.diagnosis.record import Diagnosis, MisfitRegion, NamedCause
 from bushfit.diagnosis.search import Search
 from bushfit.diagnosis.verdict import Composition, Finding, decide_verdict
@@ -178,14 +180,19 @@ class DiagnosisWriter:
         tests or records may be wrong. The candidates are the reported explanations with causes that are not leads.
         """
         finding, reported, verdict = self.finding, self.finding.reported, self.finding.verdict
+        bounds = self.request.data.bounds
         is_ambiguous = verdict == "ambiguous"
         faulty = [composition for composition in reported if composition.faulty_parts] if is_ambiguous else [first]
         may_be_wrong = is_ambiguous and (faulty or any(composition.best.claim for composition in reported))
         after, known = self._fit_with(first)
-        gap = None if may_be_wrong or verdict == "unexplained" else self._described(after)
+        gap, holdout = None if may_be_wrong or verdict == "unexplained" else self._described(after), None
+        if finding.names and not gap:  # without the rest, their amounts may be distorted
+            holdout = hold_out(self._with_free_gains(self.request.base), self._with_free_gains(after), bounds)
+            if (holdout.after or np.inf) >= (holdout.before or 0.0):
+                return replace(self, finding=replace(finding, names=())).diagnosis()
         rest = "the rest of the gap" if finding.names else "the gap"
         closing = [f"a smooth correction closes {rest}: {gap.sentence}"] if gap else []
-        candidates = [composition for composition in reported if {*composition.causes} - {*finding.leads}]
+        candidates = [c for c in reported if c.probability > 1.0 - NAMED and {*c.causes} - {*finding.leads}]
         leader, advice = candidates[0] if candidates else first, self._deciding_test()
         if claim := leader.best.claim:
             advice = f"check the records of the tests; {'; '.join(claim.corrections)}"
@@ -217,6 +224,7 @@ class DiagnosisWriter:
             places=faulty[0].best if faulty and not gap else None,
             next_test=advice,
             gap=gap,
+            holdout=holdout,
             known=known,
         )
 
