@@ -263,6 +263,11 @@ class SearchState:
         fitted = Covariance(names, covariance[:count, :count] * np.outer(slopes, slopes))
         return means, fitted.restricted([name for name in names if name not in solution.at_bound])
 
+    @property
+    def may_grow(self) -> bool:
+        """True if a further effect may be added."""
+        return len(self.effects) < self.tests.max_effects
+
     @cached_property
     def proposals(self) -> list[Proposal]:
         """Effects of the library that the model lacks, ranked by expected decrease of chi-square."""
@@ -271,7 +276,8 @@ class SearchState:
     @cached_property
     def explanation_evidence(self) -> list[tuple[Explanation, GroupEvidence]]:
         """Further explanations of the gap, each with the evidence of the tests for it in the linearised model."""
-        explanations = [e for e in (*self.proposals, *self.tests.explanations) if e.group is not None]
+        effects = self.proposals if self.may_grow else []
+        explanations = [e for e in (*effects, *self.tests.explanations) if e.group is not None]
         return list(zip(explanations, self.weigh(explanations), strict=True))
 
     def weigh(self, explanations: Sequence[Explanation]) -> list[GroupEvidence]:

@@ -12,6 +12,7 @@ from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.explanations import Explanation, FaultyPart, compound, unnamed_curves
 from bushfit.diagnosis.faulty_parts import find_faulty_parts
 from bushfit.diagnosis.groups import Group
+from bushfit.diagnosis.record import DiagnosisSettings
 from bushfit.diagnosis.rig_errors import RigErrors, in_scatter_units, rig_errors
 
 
@@ -26,6 +27,7 @@ class Tests:
         log_prior: natural log of the prior probability that these are the right records and nothing is missing.
         claim: mistake that is corrected; None for the tests as recorded.
         change: relative change of the recorded quantities by the correction; 0 for the tests as recorded.
+        max_effects: maximum number of effects of an explanation.
     """
 
     base: Evidence
@@ -34,6 +36,7 @@ class Tests:
     log_prior: float
     claim: Claim | None = None
     change: float = 0.0
+    max_effects: int = DiagnosisSettings.max_effects
 
     @cached_property
     def bare(self) -> Evidence:

@@ -59,8 +59,10 @@ class Search:
         self.request = request
         self._known: dict[frozenset[Hashable], Hypothesis] = {}
         self._visited: set[frozenset[Hashable]] = set()
-        rig, without = request.data.campaign.rig, request.settings.without
-        tests = Tests(request.base, rig, without, log(1.0 - sum(ODDS.values())))
+        settings, rig = request.settings, request.data.campaign.rig
+        adopted = sum(get_mistake(name) is None for name in settings.adopt)
+        limit = max(settings.max_effects - adopted, min(settings.max_effects, 1))
+        tests = Tests(request.base, rig, settings.without, log(1.0 - sum(ODDS.values())), max_effects=limit)
         self.root = SearchState.of_tests(tests)
         self._log_priors = prior_odds([*self.root.proposals, *tests.explanations])
         families = {e.family for e in (*request.outlier_clusters, *tests.explanations) if e.kind == "part"}
@@ -76,9 +78,8 @@ class Search:
         for depth in range(ROUNDS + 1):
             for state in track(f"round {depth + 1} of at most {ROUNDS + 1}", beam):
                 for explanation, evidence in state.explanation_evidence:
-                    if explanation.kind != "effect" or self._may_grow(state):
-                        log_odds = self._log_odds(explanation.kind, explanation.name, depth)
-                        self._note(state.extended(evidence, explanation, log_odds))
+                    log_odds = self._log_odds(explanation.kind, explanation.name, depth)
+                    self._note(state.extended(evidence, explanation, log_odds))
             if depth == ROUNDS or self._is_sure():
                 break
             fresh = list[SearchState]()
@@ -98,12 +99,6 @@ class Search:
                 break
         self._refit_linear()
         return self._ordered()
-
-    def _may_grow(self, state: SearchState) -> bool:
-        """True if a further effect may be added to a state."""
-        settings = self.request.settings
-        adopted = sum(get_mistake(name) is None for name in settings.adopt)
-        return len(state.effects) < max(settings.max_effects - adopted, min(settings.max_effects, 1))
 
     def _ordered(self) -> list[Hypothesis]:
         """Hypotheses about the gap that the search has recorded so far, the most probable first."""
@@ -196,7 +191,7 @@ class Search:
             names: names of the effects to add, one at a time.
             depth: number of explanations in the state.
         """
-        if not names or not self._may_grow(state):
+        if not names or not state.may_grow:
             return []
         models = {proposal.name: proposal.model for proposal in state.proposals if proposal.name in names}
         start = self.request.start if not state.effects and state.evidence.reduced_chi_square > _BENT else {}
@@ -302,15 +297,15 @@ class Search:
 
     def _corrected_records(self) -> Iterator[SearchState]:
         """Generate the states with one mistake in the record corrected, the most promising mistake first."""
-        data, base, without = self.request.data, self.request.base, self.request.settings.without
-        possible = claims(data, without)
+        data, base = self.request.data, self.request.base
+        possible = claims(data, self.request.settings.without)
         for claim in track("mistakes put right", list(ClaimScreening(data).best(possible, _CLAIMS))):
             with suppress(FitError, ModelError):  # corrected tests that nothing can be fitted to
                 evidence = self.request.fit_corrected(claim.corrected())
                 if [test.size for test in evidence.data_sets] == [test.size for test in base.data_sets]:
                     odds = log(ODDS["record"]) - log(len(possible)) - 0.5 * _modulus_deviation(evidence) ** 2
                     change = _record_change(base, evidence)
-                    tests = Tests(evidence, data.campaign.rig, without, odds, claim, change)
+                    tests = replace(self.root.tests, base=evidence, log_prior=odds, claim=claim, change=change)
                     yield self._visit(SearchState.of_tests(tests))
 
 
