@@ -16,7 +16,6 @@ from bushfit.cli.shared_options import campaign_options, exit_above, open_campai
 from bushfit.units import number
 
 if TYPE_CHECKING:
-    from bushfit.campaign.schema import Loss
     from bushfit.commands.diagnose import DiagnosisOutput
     from bushfit.diagnosis.document import EffectEntry
 
@@ -48,12 +47,7 @@ _COLOURS = {"consistent": "green", "named": "green", "unexplained": "red"}
 @campaign_options
 @with_output("results/<campaign name>/diagnose", "tables", "pictures", "pages")
 def command(
-    campaigns: tuple[Path, ...],
-    model: Path | None,
-    loss: Loss | None,
-    max_nrmse: float | None,
-    output: Output,
-    **settings: Any,
+    campaigns: tuple[Path, ...], model: Path | None, max_nrmse: float | None, output: Output, **settings: Any
 ) -> None:
     """Find where the model and the tests of CAMPAIGN disagree, name the missing effect, and add it.
 
@@ -65,7 +59,6 @@ def command(
     Writes diagnosis.json, model.json with the added effects, gap.csv, candidates.csv, gap.png, report.html.
     """
     from bushfit.commands.diagnose import diagnose
-    from bushfit.commands.fit import prepare_tests
     from bushfit.commands.loading import load_model
     from bushfit.commands.provenance import input_files
     from bushfit.effects.mistakes import get_candidate
@@ -75,9 +68,8 @@ def command(
     for name in (*settings["adopt"], *settings["without"]):
         get_candidate(name)
     folder = output.folder(campaign.name, "diagnosis.json", "model.json")
-    data = prepare_tests(campaign, loss)
-    output.warn(data.notes)
-    diagnosed = diagnose(data, model=start, **settings)
+    diagnosed = diagnose(campaign, model=start, **settings)
+    output.warn(diagnosed.data.notes)
     print_diagnosis(output, diagnosed)
     output.write(folder, diagnosed.files, diagnosed.document, input_files(campaign, model))
     exit_above(max_nrmse, diagnosed.result)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from bushfit.cli.options import command_called, direction_option, file_option, flag, option, option_group
 from bushfit.cli.output import Output, with_output
@@ -87,15 +87,7 @@ def dynamic(
 )
 @campaign_options
 @with_output("results/<campaign name>/fit", "tables", "pictures")
-def command(
-    campaigns: tuple[Path, ...],
-    directions: tuple[str, ...],
-    effects: tuple[str, ...],
-    profile: bool,
-    loss: Loss | None,
-    max_nrmse: float | None,
-    output: Output,
-) -> None:
+def command(campaigns: tuple[Path, ...], max_nrmse: float | None, output: Output, **settings: Any) -> None:
     """Fit all five parameters to the loops and sweeps of CAMPAIGN together.
 
     Use this fit unless you need the two steps of the paper. It fits the axial tests, or the tests of all directions if
@@ -111,7 +103,7 @@ def command(
 
     campaign = open_campaign(campaigns)
     folder = output.folder(campaign.name, "model.json")
-    fitted = fit(campaign, directions=directions, effects=effects, profile=profile, loss=loss)
+    fitted = fit(campaign, **settings)
     _print_and_write(output, folder, fitted, input_files(campaign), max_nrmse)
 
 

@@ -37,15 +37,13 @@ def command(campaigns: tuple[Path, ...], loss: Loss | None, max_nrmse: float | N
     a table and a plot of the loops, the sweeps, the gap (measured minus model), and each direction and specimen. If the
     diagnosis adds an effect to the model, joint.json contains the fit without this effect.
     """
-    from bushfit.commands.fit import prepare_tests
     from bushfit.commands.provenance import input_files
     from bushfit.commands.run import run
 
     campaign = open_campaign(campaigns)
     folder = output.folder(campaign.name, "model.json", "diagnosis.json")
-    data = prepare_tests(campaign, loss)
-    output.warn(data.notes)
-    outcome = run(data)
+    outcome = run(campaign, loss=loss)
+    output.warn(outcome.data.notes)
     diagnosis, description = outcome.diagnosed and outcome.diagnosed.diagnosis, "the joint fit"
     if diagnosis and diagnosis.added:
         effects = ", ".join(effect.label for effect in diagnosis.effects)

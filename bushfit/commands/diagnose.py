@@ -7,6 +7,7 @@ from itertools import zip_longest
 from pathlib import Path
 
 from bushfit.campaign.campaign import Campaign
+from bushfit.campaign.schema import Loss
 from bushfit.commands.fit import FitOutput, fit, prepare_tests
 from bushfit.commands.loading import HasResult, as_result
 from bushfit.commands.provenance import campaign_document, option_words, result_document
@@ -69,6 +70,7 @@ def diagnose(
     without: Sequence[str] = (),
     max_effects: int = DiagnosisSettings.max_effects,
     tolerance: float = DiagnosisSettings.tolerance,
+    loss: Loss | None = None,
     joint: FitOutput | None = None,
 ) -> DiagnosisOutput:
     """Find where model and tests disagree, name the missing effect, and add it to the model.
@@ -80,6 +82,7 @@ def diagnose(
         without: effects and mistakes that are not considered.
         max_effects: largest number of effects that are added.
         tolerance: gap between model and tests, relative to the stiffness magnitude, below which they agree.
+        loss: "soft_l1" or "linear"; default the campaign's.
         joint: joint fit of the campaign, if already computed, to save time.
 
     Returns:
@@ -88,7 +91,7 @@ def diagnose(
     Raises:
         BushfitError: tests or settings that cannot support the diagnosis.
     """
-    data, start = prepare_tests(campaign), as_result(model) if model else None
+    data, start = prepare_tests(campaign, loss), as_result(model) if model else None
     unresolved = [name for name in start.unresolved if name not in adopt] if start else []
     settings = DiagnosisSettings(max_effects, tolerance, tuple(adopt), tuple(without), tuple(unresolved))
     _require_free_parameter(data, start.model if start else None, settings)
