@@ -9,7 +9,7 @@ import click
 
 from bushfit.cli.options import FILE, command_called, direction_option, option, option_group
 from bushfit.cli.output import Output, with_output
-from bushfit.cli.shared_options import Grid, grid_options
+from bushfit.cli.shared_options import grid_options
 from bushfit.errors import error_location, quote_path
 from bushfit.progress import track
 
@@ -38,14 +38,7 @@ _ALL = "all"
     ),
 )
 @with_output("results/<names>/compare", "tables", "pictures", "pages")
-def command(
-    sources: tuple[Path, ...],
-    families: str | None,
-    directions: tuple[str, ...],
-    preload: str | None,
-    output: Output,
-    **grids: Grid | None,
-) -> None:
+def command(sources: tuple[Path, ...], families: str | None, output: Output, **settings: Any) -> None:
     """Compare results with A, the reference: differences in parameters, stiffness and loss factor.
 
     A and B are models (JSON), folders of results, or campaigns, which are fitted first. Each difference has a 95 %
@@ -65,9 +58,8 @@ def command(
         raise click.UsageError(f"2 to {MOST} results are needed, or one campaign with '--families' after it.")
     if families is not None and len(sources) > 1:
         raise click.UsageError("'--families' takes one campaign.")
-    texts = {key: grid.text if grid else None for key, grid in grids.items()}
-    words = option_words(families=families, direction=directions, preload=preload, **texts)
-    settings: dict[str, Any] = {**grids, "directions": directions, "preload": preload}
+    texts = {key: getattr(value, "text", value) for key, value in settings.items()}  # a grid as it was typed
+    words = option_words(families=families, direction=texts.pop("directions"), **texts)
     entries: list[Campaign | ComparedResult] = []
     settings["command"] = command_line("compare", *map(str, sources), *words)
     if families is not None:
@@ -81,7 +73,7 @@ def command(
         for source in track("results fitted", sources):
             loaded = load_source(source)
             digest = None if isinstance(loaded, Campaign) else model_source(model_file(source)).sha256
-            entries.append(compared_result(loaded, str(source), digest, directions))
+            entries.append(compared_result(loaded, str(source), digest, settings["directions"]))
     name = " and ".join(entry.name for entry in entries)
     folder = output.folder(name, "compare.json")
     compared = compare(*entries, **settings)

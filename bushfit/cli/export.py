@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -76,14 +76,7 @@ def parse_cardanic(text: str) -> complex:
 )
 @prediction_options("Use the frequencies and amplitudes of this campaign.")
 @with_output("results/<name>/export", "tables")
-def command(
-    model: Path,
-    formats: tuple[str, ...],
-    campaign: Path | None,
-    dialect: Literal["optistruct"] | None,
-    output: Output,
-    **settings: Any,
-) -> None:
+def command(model: Path, formats: tuple[str, ...], campaign: Path | None, output: Output, **settings: Any) -> None:
     """Write a fitted model for other programs: a solver, a multibody code, a spreadsheet.
 
     MODEL is the model.json of run, fit or diagnose, its folder, or dynamic.json. If a format cannot represent a
@@ -99,6 +92,7 @@ def command(
     from bushfit.commands.provenance import input_files
 
     result, loaded = load_model(model), load_campaign(campaign) if campaign else None
+    dialect = settings.pop("dialect")
     if dialect and "nastran" not in formats:
         raise click.UsageError("'--dialect' requires '--format nastran'.")
     if settings["time_domain"] and "abaqus" not in formats:

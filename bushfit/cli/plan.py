@@ -79,14 +79,7 @@ def parse_names(text: str) -> tuple[str, ...]:
 )
 @option_group("Range of later predictions", grid_options("from the campaign"))
 @with_output("results/<name>/plan", "tables")
-def command(
-    source: Path,
-    aim: Aim | None,
-    targets: tuple[tuple[str, float], ...],
-    campaign: Path | None,
-    output: Output,
-    **settings: Any,
-) -> None:
+def command(source: Path, campaign: Path | None, aim: Aim | None, output: Output, **settings: Any) -> None:
     """Select the most informative next tests within the limits of the rig.
 
     The plan starts from the tests of CAMPAIGN, or from MODEL.json or a folder of results. If CAMPAIGN has no tests, the
@@ -99,7 +92,7 @@ def command(
     from bushfit.commands.loading import load_source
     from bushfit.commands.plan import plan
 
-    parameters, rivals = settings["parameters"], settings["rivals"]
+    parameters, rivals, targets = settings["parameters"], settings["rivals"], dict(settings.pop("targets"))
     if aim not in (None, "rivals") and rivals:
         raise click.UsageError("'--rivals' requires '--for rivals'.")
     if aim not in (None, "parameters") and parameters:
@@ -112,7 +105,7 @@ def command(
         raise click.UsageError("'--campaign' requires MODEL.json.")
     folder = output.folder(opened.name, "plan.json")
     with error_location(source):
-        outcome = plan(opened, settings_campaign, aim=aim or implied, targets=dict(targets), **settings)
+        outcome = plan(opened, settings_campaign, aim=aim or implied, targets=targets, **settings)
     _print_plan(output, outcome)
     output.write(folder, outcome.files, outcome.document, [source, *([campaign] if campaign else [])])
     if outcome.plan.tests:

@@ -74,15 +74,7 @@ def parse_motion(text: str) -> LargeMotion:
     ),
 )
 @with_output("results/<name>/predict", "tables", "pictures")
-def command(
-    model: Path,
-    campaign: Path | None,
-    bushing: str | None,
-    mass: float | None,
-    base_acceleration: float | None,
-    output: Output,
-    **settings: Any,
-) -> None:
+def command(model: Path, campaign: Path | None, bushing: str | None, output: Output, **settings: Any) -> None:
     """Predict dynamic stiffness and loss factor over frequency and amplitude, with 95 % bands.
 
     MODEL is the model.json of run, fit or diagnose, its folder, or dynamic.json. Effects that belong to the test rig
@@ -96,10 +88,10 @@ def command(
     from bushfit.units import si_factor
 
     result, loaded = load_model(model), load_campaign(campaign) if campaign else None
-    if (mass is None) != (base_acceleration is None):
+    if (settings["mass"] is None) != (settings["base_acceleration"] is None):
         raise click.UsageError("'--mass' and '--base-acceleration' go together.")
     target = None if bushing is None else _bushing_of(result, bushing)
-    predicted = predict(result, loaded, bushing=target, mass=mass, base_acceleration=base_acceleration, **settings)
+    predicted = predict(result, loaded, bushing=target, **settings)
     _print_summary(output, predicted)
     print_predictions(output, predicted)
     for resonance in predicted.resonances:
