@@ -65,18 +65,7 @@ def parse_effect(text: str) -> str:
 )
 @with_output("results/<manifest>", "tables", "pictures", "pages")
 def command(
-    manifest: tuple[str, ...],
-    operating_points: tuple[str, ...],
-    limits: Path | None,
-    junit: Path | None,
-    jobs: int | None,
-    scheduler: str | None,
-    resume: bool,
-    tables: bool,
-    plots: bool,
-    reports: bool,
-    output: Output,
-    **row: Any,
+    manifest: tuple[str, ...], limits: Path | None, junit: Path | None, resume: bool, output: Output, **options: Any
 ) -> None:
     """Evaluate many campaigns and collect the results in one table.
 
@@ -93,7 +82,8 @@ def command(
     from bushfit.batch.executor import dask_workers, local_workers
 
     # Workers import their modules while this process reads the manifest.
-    workers = local_workers(jobs or os.cpu_count() or 1) if scheduler is None else dask_workers(scheduler)
+    jobs, scheduler = options["jobs"] or os.cpu_count() or 1, options["scheduler"]
+    workers = local_workers(jobs) if scheduler is None else dask_workers(scheduler)
     from bushfit.batch.limits import read_limits
     from bushfit.batch.manifest import RowSettings, read_manifest
     from bushfit.batch.quantities import parse_point
@@ -101,14 +91,15 @@ def command(
     from bushfit.batch.run import check_output, run_batch
     from bushfit.batch.summary import BatchPlan
 
-    settings = RowSettings(**{key: values or None for key, values in row.items()})
+    settings = RowSettings(**{key: options[key] or None for key in ("commands", "directions", "effects")})
     listed = read_manifest(manifest[0], settings, *manifest[1:])
     judged_by = read_limits(limits, listed.rows) if limits else None
     with error_location(place="--at"):
-        points = [*listed.points, *map(parse_point, operating_points)]
+        points = [*listed.points, *map(parse_point, options["operating_points"])]
     if judged_by:
         points += [*(limit.at for limit in judged_by.stiffness), *(limit.at for limit in judged_by.loss_factor)]
-    formats = replace(output.formats, tables=tables, pictures=plots and output.formats.pictures, pages=reports)
+    pictures = options["plots"] and output.formats.pictures
+    formats = replace(output.formats, tables=options["tables"], pictures=pictures, pages=options["reports"])
     folder = output.folder(listed.title)
     task = RowTask(folder.absolute(), tuple(dict.fromkeys(points)), formats, resume)
     plan = BatchPlan(listed.title, listed.rows, task, judged_by, junit, output.formats)

@@ -89,6 +89,7 @@ def command(model: Path, formats: tuple[str, ...], campaign: Path | None, output
     from bushfit.campaign.campaign import load_campaign
     from bushfit.commands.export import export
     from bushfit.commands.loading import load_model, model_file, model_source
+    from bushfit.commands.predict import GridOptions
     from bushfit.commands.provenance import input_files
 
     result, loaded = load_model(model), load_campaign(campaign) if campaign else None
@@ -102,7 +103,9 @@ def command(model: Path, formats: tuple[str, ...], campaign: Path | None, output
     written = [_FILES[dialect or name if name == "nastran" else name] for name in names if name in _FILES]
     folder = output.folder((loaded or result).name, *written)
     source = model_source(file)
-    exported = export(result, source, names, loaded, dialect=dialect or "nastran", decimal_comma=comma, **settings)
+    settings |= {"dialect": dialect or "nastran", "decimal_comma": comma}
+    grid: Any = {key: settings.pop(key) for key in GridOptions.__annotations__}
+    exported = export(result, source, names, loaded, grid, **settings)
     limits = dict[str, list[str]]()
     for name, of_format in exported.exported.items():
         for omission in of_format.omissions:

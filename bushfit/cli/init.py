@@ -69,14 +69,7 @@ _Read = TypeVar("_Read")
 @metadata_options()
 @option_group("Output", flag("--no-input", "Ask no questions; report missing information as an error."))
 @with_output("results/<bushing name>")
-def command(
-    files: tuple[Path, ...],
-    name: str | None,
-    no_input: bool,
-    test_options: Mapping[str, Any],
-    output: Output,
-    **sizes: str | None,
-) -> None:
+def command(files: tuple[Path, ...], name: str | None, no_input: bool, output: Output, **sizes: Any) -> None:
     """Write a campaign from test files and the geometry of the bushing.
 
     A campaign is a text file of a bushing and its tests. FILE is a test file, a workbook or a folder. In a terminal,
@@ -87,6 +80,7 @@ def command(
     from bushfit.inspection.gathering import gather
     from bushfit.inspection.record import campaign_text, campaigns_of_parts, with_specimens_named
 
+    test_options: Mapping[str, Any] = sizes.pop("test_options")
     at_terminal = sys.stdin is not None and sys.stdin.isatty()
     questions = Questions(output, at_terminal and not (no_input or output.quiet or output.as_json))
     usual = (files[0].resolve() if files[0].is_dir() else files[0].resolve().parent).name

@@ -59,14 +59,7 @@ _DISPLAYED = ("displacement", "stiffness")
     ),
 )
 @with_output("results/<first file>", "tables", "pictures")
-def command(
-    files: tuple[Path, ...],
-    test_options: Mapping[str, Any],
-    levels: str | None,
-    cycles: int,
-    output: Output,
-    **shaker: Any,
-) -> None:
+def command(files: tuple[Path, ...], levels: str | None, cycles: int, output: Output, **shaker: Any) -> None:
     """Reduce raw stepped-sine histories or a resonance test to a sweep.
 
     A raw history contains time, displacement and force, with many steps of at least five cycles. Several files of one
@@ -78,6 +71,7 @@ def command(
     from bushfit.reduction.steps import reduce
     from bushfit.report.reduced import reduced_table, resonance_table
 
+    test_options: Mapping[str, Any] = shaker.pop("test_options")
     folder = output.folder(files[0].stem, output.formats.table("sweep"))
     table = _resonance_table(files[0], test_options, shaker)
     document: dict[str, Any] = {}

@@ -39,14 +39,7 @@ if TYPE_CHECKING:
 )
 @metadata_options("displacements")
 @with_output("results/<name>/respond", "tables", "pictures")
-def command(
-    model: Path,
-    history: Path,
-    directions: tuple[str, ...],
-    test_options: dict[str, Any],
-    output: Output,
-    **settings: Any,
-) -> None:
+def command(model: Path, history: Path, directions: tuple[str, ...], output: Output, **settings: Any) -> None:
     """Predict the force over time for a displacement history, with its 95 % band.
 
     MODEL is the model.json of run, fit or diagnose, or its folder. HISTORY is a table or recording with a time and a
@@ -65,17 +58,11 @@ def command(
         )
     result = load_model(model)
     folder = output.folder(result.name, output.formats.table("response"))
-    columns, units = (test_options.pop(key, None) for key in ("columns", "units"))
+    test_options = settings.pop("test_options")
+    settings |= {key: test_options.pop(key, None) for key in ("columns", "units")}
+    settings |= {"direction": directions[0] if directions else None, "file_format": FileFormat(**test_options)}
     with options_named():
-        response = respond(
-            result,
-            history,
-            direction=directions[0] if directions else None,
-            columns=columns,
-            units=units,
-            file_format=FileFormat(**test_options),
-            **settings,
-        )
+        response = respond(result, history, **settings)
     print_response(output, response)
     output.write(folder, response.files, response.document, [model_file(model), history])
 

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import partial
-from typing import Unpack
+from typing import Any
 
 import numpy as np
 from typing_extensions import TypedDict
@@ -13,8 +13,7 @@ from typing_extensions import TypedDict
 from bushfit.campaign.campaign import Campaign
 from bushfit.commands.predict import GridOptions, predict
 from bushfit.commands.predicted import PredictionOutput
-from bushfit.export.contract import Dialect, Exported, ExportRequest, UnitSystem
-from bushfit.model.arms import ACCURACY
+from bushfit.export.contract import Exported, ExportRequest
 from bushfit.model.result import Result
 from bushfit.progress import track
 from bushfit.reading.measurement import Source
@@ -75,38 +74,17 @@ class ExportOutput:
 
 
 def export(
-    result: Result,
-    source: Source,
-    formats: Sequence[str],
-    campaign: Campaign | None = None,
-    *,
-    accuracy: float = ACCURACY,
-    units: UnitSystem | None = None,
-    dialect: Dialect = "nastran",
-    decimal_comma: bool = False,
-    static_rates: Mapping[str, float] | None = None,
-    time_domain: bool = False,
-    cardanic: complex | None = None,
-    temperature: float | None = None,
-    **grid: Unpack[GridOptions],
+    result: Result, source: Source, names: Sequence[str], campaign: Campaign | None, grid: GridOptions, **settings: Any
 ) -> ExportOutput:
     """Convert a fitted model to files for other programs.
 
     Args:
         result: fitted model.
         source: name and SHA-256 of its model file, which the files quote.
-        formats: names of formats: "fmu", "nastran", "abaqus", "adams", "prony", "csv", "xlsx".
+        names: names of formats: "fmu", "nastran", "abaqus", "adams", "prony", "csv", "xlsx".
         campaign: campaign whose grid is the default.
-        accuracy: largest relative error of the modulus in an FMU, and the aim for a Prony series.
-        units: units of length, mass, time and force; default those usual for each format.
-        dialect: dialect of the format nastran.
-        decimal_comma: True to write CSV files with decimal commas.
-        static_rates: rates of the static curves of adams by SI unit of displacement: "m" [m/s] or "rad" [rad/s];
-            default the rate of the slowest loop.
-        time_domain: True to write the materials of abaqus as Prony series.
-        cardanic: complex stiffness of the rotations about x and y in decks [N m/rad]; None for no stiffness.
-        temperature: temperature [K], if the model has the effect of temperature.
         grid: directions, frequencies and amplitudes, as of `predict`; all directions share one list of frequencies.
+        settings: settings of `ExportRequest`, such as `accuracy`, `units` and `temperature`.
 
     Returns:
         Predictions, the content for each format with its omissions, and the result files.
@@ -114,16 +92,16 @@ def export(
     Raises:
         ModelError: a model that a format cannot represent, or an invalid grid.
     """
+    temperature = settings["temperature"]
     predicted = predict(result, campaign, temperature=temperature, **grid)
     frequencies = [np.unique(prediction.frequency) for prediction in predicted.predictions]
     if not all(np.array_equal(axis, frequencies[0]) for axis in frequencies):
         grid["frequencies"] = np.unique(np.concatenate(frequencies))
         predicted = predict(result, campaign, temperature=temperature, **grid)
-    settings = (accuracy, units, dialect, decimal_comma, temperature, static_rates, time_domain, cardanic)
     today = datetime.now(UTC).date().isoformat()
-    request = ExportRequest(result, source, tuple(predicted.predictions), *settings, today)
+    request = ExportRequest(result, source, tuple(predicted.predictions), day=today, **settings)
     exported: dict[str, Exported] = {}
-    for name in track("formats written", formats):
+    for name in track("formats written", names):
         module, _, function = FORMATS[name].partition(":")
         exported[name] = getattr(importlib.import_module(f"bushfit.{module}"), function)(request)
     document: ExportDocument = {
