@@ -5,23 +5,20 @@ from typing import Any
 from urllib.parse import quote
 
 import numpy as np
-from markupsafe import Markup
 
-from bushfit.effects.contract import Array
 from bushfit.report import plots
 from bushfit.report.batch_document import BatchFile, PartTable
-from bushfit.report.page import render_page, templates
+from bushfit.report.page import render_page
 from bushfit.report.page.svg import picture
 from bushfit.report.tables import spread_indices
-from bushfit.units import number, split_header
+from bushfit.units import split_header
 
 #: Largest number of cells of the table of parts, where a curve is three cells: the page stays below 500 kB.
 _MOST_CELLS = 4000
 #: Largest number of parts that a list names.
 _MOST_NAMED = 20
-#: Size of a sparkline [pixels], and smallest relative deviation at its upper and lower edge.
-_WIDTH, _HEIGHT, _LEAST_SCALE = 110, 26, 0.005
-_DIFFERENT, _USUAL = "#b4500c", "#1f4e9c"
+#: Smallest relative deviation at the upper and lower edge of a sparkline.
+_LEAST_SCALE = 0.005
 #: Order of the rows: parts that need attention first.
 _ORDER = ("error", "fail", "conditional fail", "not judged", "differs", "conditional pass", "")
 #: Text columns that the table of parts contains if they differ between parts (the first: also from the part's name).
@@ -64,11 +61,9 @@ def index_page(batch: BatchFile, folder: Path, base: str = "") -> str:
     warnings = list(dict.fromkeys(line for index in chosen for line in parts[index].warnings))
     rows = []
     for index in chosen:
-        part, curve, deviation = parts[index], Markup(""), ""
-        if has_curves and np.isfinite(relative[index]).all():
-            curve = sparkline(relative[index], relative[usual], scale, _DIFFERENT if part.deviations else _USUAL)
-            deviation = f"{100.0 * np.expm1(np.log1p(relative[index]).mean()):+.1f}"
-        rows.append((part, links[index], curve, deviation))
+        is_known = has_curves and np.isfinite(relative[index]).all()
+        mean = 100.0 * np.expm1(np.log1p(relative[index]).mean()) if is_known else None
+        rows.append((parts[index], links[index], relative[index].tolist() if is_known else [], mean))
     pictures = []
     if has_curves:
         singles = {part.name: curves[k] for k, part in enumerate(parts) if part.curve and not usual[k]}
@@ -83,6 +78,7 @@ def index_page(batch: BatchFile, folder: Path, base: str = "") -> str:
         "parts_compared": max((table.parts for table in compared), default=0),
         "units": units,
         "scale": scale,
+        "band": [relative[usual].min(axis=0).tolist(), relative[usual].max(axis=0).tolist()] if has_curves else [],
         "pictures": pictures,
         "labels": labels,
         "columns": ["measured stiffness, deviation [%]"] * has_curves + [*batch.quantities],
@@ -91,26 +87,3 @@ def index_page(batch: BatchFile, folder: Path, base: str = "") -> str:
         "shown": (len(first), important, len(chosen) - len(first)),
     }
     return render_page("index.html", context)
-
-
-def sparkline(curve: Array, usual: Array, scale: float, color: str) -> Markup:
-    """Draw the relative deviation of a measured curve from the median of the batch as a small SVG element.
-
-    Args:
-        curve: relative deviation of |K| at each operating point, (k,).
-        usual: relative deviations of the m usual parts, whose range is a grey band, (m, k).
-        scale: relative deviation at the upper and lower edge of the drawing.
-        color: colour of the curve.
-
-    Returns:
-        SVG element with its description.
-    """
-    x = np.linspace(1.0, _WIDTH - 1.0, curve.size)
-    band = np.concatenate([x, x[::-1]]), np.concatenate([usual.min(axis=0), usual.max(axis=0)[::-1]])
-    paths = {}
-    for name, (across, relative) in {"line": (x, curve), "band": band}.items():
-        y = (0.5 - 0.46 * np.clip(relative / scale, -1.0, 1.0)) * _HEIGHT
-        paths[name] = "M" + "L".join(f"{a:.1f} {b:.1f}" for a, b in zip(across, y, strict=True))
-    ends = (number(100.0 * float(end), 2, "+") for end in (curve.min(), curve.max()))
-    context = {"alt": f"{' to '.join(ends)} % off the median", "width": _WIDTH, "height": _HEIGHT, "color": color}
-    return Markup(templates().get_template("spark.html").render(context | paths))
