@@ -139,6 +139,22 @@ class BatchError(BushfitError):
     """A batch that cannot continue: no workers, another version on the workers, or no connection to the cluster."""
 
 
+def unknown_name(
+    problem: str, name: str, names: Collection[str], kind: type[BushfitError] = BushfitError, place: str | None = None
+) -> BushfitError:
+    """Make the error, to be raised, for a name that is none of the known names; the hint is the most similar one.
+
+    Args:
+        problem: what is wrong.
+        name: unknown name.
+        names: known names.
+        kind: class of the error.
+        place: location of the name, such as the option that states it.
+    """
+    expected = f"one of {', '.join(names)}"
+    return kind(problem, place=place, found=name, expected=expected, hint=did_you_mean(name, names))
+
+
 def quote_path(path: Path) -> str:
     """Return a path as it is typed in a terminal: in quotes if it contains characters that a shell would interpret."""
     return f'"{path}"' if _SHELL_CHARACTERS.search(str(path)) else str(path)

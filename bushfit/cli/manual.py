@@ -22,14 +22,13 @@ def command(page: str | None, output: Output) -> None:
     """
     import tempfile
 
-    from bushfit.errors import BushfitError, did_you_mean
+    from bushfit.errors import unknown_name
     from bushfit.report.page.manual import manual_page, page_names
     from bushfit.report.results import ResultFile
 
     names = page_names()
     if page not in (None, *names):
-        hint = did_you_mean(page or "", names)
-        raise BushfitError("no such page", place="PAGE", found=page, expected=f"one of {', '.join(names)}", hint=hint)
+        raise unknown_name("no such page", str(page), names, place="PAGE")
     folder = output.output or Path(tempfile.mkdtemp(prefix="bushfit-manual-"))
     file = (folder / "manual.html").resolve()
     output.write(folder, [ResultFile("manual", "page", manual_page)], {"file": str(file), "pages": names})

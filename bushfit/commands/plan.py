@@ -15,7 +15,7 @@ from bushfit.campaign.simulated import SimulatedLoop
 from bushfit.commands.fit import prepare_tests
 from bushfit.commands.predict import GridOptions, requested_settings
 from bushfit.effects.contract import Array
-from bushfit.errors import ModelError, did_you_mean
+from bushfit.errors import ModelError, unknown_name
 from bushfit.geometry import default_places, get_places
 from bushfit.model.result import Result
 from bushfit.planning.campaign import campaign_toml
@@ -93,13 +93,7 @@ def plan(
     campaign = source if isinstance(source, Campaign) else campaign
     for name in parameters:
         if name not in knowledge.names:
-            raise ModelError(
-                "this is not a parameter of the plan",
-                place="--parameters",
-                found=name,
-                expected=", ".join(knowledge.names),
-                hint=did_you_mean(name, knowledge.names),
-            )
+            raise unknown_name("this is not a parameter of the plan", name, knowledge.names, ModelError, "--parameters")
     specimens = knowledge.result.specimens
     default = default_places(knowledge.model.bushing, () if knowledge.model.bushing else specimens)
     places = tuple(place for name in test_directions for place in get_places(name, specimens)) or tuple(default)
@@ -154,8 +148,7 @@ def _targets(name: str, knowledge: Knowledge, grids: Sequence[PredictionGrid]) -
         predictions = [f"{quantity}.{grid.place}" for grid in grids]
         possible |= {quantity: predictions, **{prediction: [prediction] for prediction in predictions}}
     if name not in possible:
-        expected, hint = ", ".join(possible), did_you_mean(name, tuple(possible))
-        raise ModelError("there is no such target", place="--target", found=name, expected=expected, hint=hint)
+        raise unknown_name("there is no such target", name, possible, ModelError, "--target")
     return possible[name]
 
 

@@ -15,7 +15,7 @@ from typing import Any, Literal
 
 from typing_extensions import get_original_bases
 
-from bushfit.errors import BushfitError, did_you_mean
+from bushfit.errors import unknown_name
 
 
 @dataclass(frozen=True)
@@ -62,12 +62,7 @@ def schema(name: str) -> dict[str, Any]:
     from pydantic import TypeAdapter
 
     if name not in DESCRIBED:
-        raise BushfitError(
-            "there is no such schema",
-            found=f'"{name}"',
-            expected="one of " + ", ".join(DESCRIBED),
-            hint=did_you_mean(name, DESCRIBED),
-        )
+        raise unknown_name("there is no such schema", name, DESCRIBED)
     described = DESCRIBED[name]
     module, _, kind = described.type.rpartition(".")
     adapter = TypeAdapter[Any](getattr(importlib.import_module(f"bushfit.{module}"), kind))
