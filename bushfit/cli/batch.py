@@ -21,13 +21,6 @@ if TYPE_CHECKING:
 _MOST_SHOWN = 10
 
 
-def parse_effect(text: str) -> str:
-    """Name of a known effect."""
-    from bushfit.effects import get_effect
-
-    return get_effect(text).name
-
-
 @command_called("batch", '"data/practice/*/bushing.toml" --at "axial 25 Hz 0.1 mm"')
 @click.argument("manifest", metavar="MANIFEST", nargs=-1, required=True)
 @option_group(
@@ -39,7 +32,7 @@ def parse_effect(text: str) -> str:
         multiple=True,
     ),
     direction_option("fit", "as of `bushfit fit`"),
-    option("--effect effects NAME", "Add this effect to each model.", type=parse_effect, multiple=True),
+    option("--effect effects NAME", "Add this effect to each model.", multiple=True),
     option(
         "--at operating_points POINT",
         'Add table columns with stiffness and loss factor at this point, such as "axial 25 Hz 0.1 mm".',
@@ -90,7 +83,10 @@ def command(
     from bushfit.batch.row import RowTask
     from bushfit.batch.run import check_output, run_batch
     from bushfit.batch.summary import BatchPlan
+    from bushfit.effects import get_effect
 
+    with error_location(place="--effect"):
+        options["effects"] = [get_effect(name).name for name in options["effects"]]
     settings = RowSettings(**{key: options[key] or None for key in ("commands", "directions", "effects")})
     listed = read_manifest(manifest[0], settings, *manifest[1:])
     judged_by = read_limits(limits, listed.rows) if limits else None

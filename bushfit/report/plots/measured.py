@@ -14,6 +14,7 @@ from bushfit.model.result import Result
 from bushfit.prediction.stiffness import Prediction
 from bushfit.reading.measurement import SAME_TEMPERATURE
 from bushfit.reading.preload import SAME_PRELOAD
+from bushfit.reduction.harmonics import cycle_harmonics
 from bushfit.report.tables import displacement_header, response_headers, spread_indices
 from bushfit.units import format_range, number
 
@@ -173,6 +174,5 @@ def sector_means(loop: pd.DataFrame, place: Place, header: str) -> tuple[Array, 
 def phase_after_turn(loop: pd.DataFrame, place: Place) -> Array:
     """Phase of each row of a loop [deg], (n,), from 0 at the maximum of the motion (the upper turn) up to 360."""
     turns = (loop["time [s]"] * loop["frequency [Hz]"]).to_numpy()
-    motion = loop[displacement_header(place)].to_numpy()
-    first_harmonic = np.mean((motion - motion.mean()) * np.exp(-2j * np.pi * turns))
-    return np.asarray(360.0 * ((turns + np.angle(first_harmonic) / (2.0 * np.pi)) % 1.0))
+    _, fundamental, _ = cycle_harmonics(turns, loop[[displacement_header(place)]].to_numpy(), order=1)
+    return np.asarray(360.0 * ((turns + np.angle(fundamental[0]) / (2.0 * np.pi)) % 1.0))
