@@ -86,7 +86,7 @@ def command(
     from bushfit.effects import get_effect
 
     with error_location(place="--effect"):
-        options["effects"] = [get_effect(name).name for name in options["effects"]]
+        options["effects"] = tuple(get_effect(name).name for name in options["effects"])
     settings = RowSettings(**{key: options[key] or None for key in ("commands", "directions", "effects")})
     listed = read_manifest(manifest[0], settings, *manifest[1:])
     judged_by = read_limits(limits, listed.rows) if limits else None
