@@ -155,8 +155,7 @@ class Term:
 
     Args:
         evidence: the fitted model and the tests.
-        measure: unit of the added stiffness: stiffness [N/m or N m/rad], shear modulus [Pa], or ratio to the model's
-            stiffness [1].
+        measure: unit of the added stiffness, see `Measure`.
     """
 
     evidence: Evidence
@@ -204,11 +203,7 @@ class Term:
         return shapes / np.abs(shapes * self.unit(model) / self.stiffness(model)).max(axis=-1)[:, None]
 
     def residual(self, value: Array, model: Model) -> Array:
-        """Whitened residuals of a model with an added stiffness.
-
-        Args:
-            value: added stiffness at the operating points, in the unit of the law, (p,).
-            model: model at its current parameters.
+        """Whitened residuals of a model with an added stiffness `value`, in the unit of the law, (p,).
 
         Returns:
             Residuals of all tests and priors, (n,).
@@ -247,8 +242,9 @@ class Term:
                 stiffness, change = test.stiffness_slopes(model, names)
                 change = test.residual_change((1.0 + share / stiffness) * change, model, added[points])
             else:
-                change = test.residual_change(share * log_slopes(model, test, names), model)
-                change = test.jacobian(model, names) + change
+                change = test.jacobian(model, names) + test.residual_change(
+                    share * log_slopes(model, test, names), model
+                )
             rows[:, place[test]] = slopes * change
         return residuals, rows, columns.reshape(2, len(shapes), -1).swapaxes(0, 1)
 
