@@ -152,15 +152,18 @@ def patterns(
 
 @dataclass(frozen=True, eq=False)
 class RestrictedLikelihood:
-    """Restricted likelihood of the size (standard deviation) of a Gaussian process added to a fitted model.
+    """Restricted likelihood of the standard deviation of a Gaussian process added to a fitted model.
 
     Args:
-        values: eigenvalues l of U^T P U, (q,). The columns of U are the whitened residuals for a unit of each pattern;
-            P projects out the changes of the residuals that the fitted parameters can absorb.
-        squares: squared components b^2 of U^T P r along the eigenvectors, (q,); r are the whitened residuals.
+        values: eigenvalues l of U^T P U, (q,). Column i of U is the change of the whitened residuals by pattern i of
+            the process (a column of a square root of its covariance) with amount 1; P projects out the changes that
+            the fitted parameters can absorb.
+        squares: squared components b^2 of U^T P r along the eigenvectors, (q,); r are the whitened residuals of the
+            fitted model.
 
     Notes:
-        A size v adds sum(v^2 b^2/(1 + v^2 l) - ln(1 + v^2 l))/2 to the natural logarithm of the likelihood.
+        A process with v times the standard deviation of the patterns adds sum(v^2 b^2/(1 + v^2 l) - ln(1 + v^2 l))/2
+        to the natural logarithm of the likelihood.
     """
 
     values: Array

@@ -12,7 +12,11 @@ from bushfit.validation import Count, Length, Name, si
 
 
 def _check_name(name: str) -> str:
-    """Raise a ValueError if a body has the name of a direction or of another table of the results."""
+    """Return the name of a bushing or specimen.
+
+    Raises:
+        ValueError: a direction, or another table in the results folder, has this name.
+    """
     if name in (*Direction, "loops", "sweeps", "gap", "candidates", "measured", "shear"):
         expected = "a name of its own: its tables are named after it"
         raise ValueError(CampaignError("another table has this name", found=name, expected=expected))

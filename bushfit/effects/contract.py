@@ -50,7 +50,7 @@ class StiffnessBelow(Protocol):
     """Steady response without a layer and those around it: an argument of `Layer.stiffness`."""
 
     def __call__(self, omega: Array, amplitude: Array, /) -> Array:
-        """Complex dynamic stiffness at omega [rad/s] and amplitude [m or rad]."""
+        """Complex dynamic stiffness [N/m or N m/rad] at omega [rad/s] and amplitude [m or rad]."""
 
     def cycle(self, omega: Array, motion: Array, points: Any) -> Array:
         """Force over one steady cycle of any waveform, for layers that distort the waveform.

@@ -221,16 +221,17 @@ def _strokes(senses: Sequence[Any], distances: Sequence[Any], u: Any) -> list[tu
 
 
 def _stress_at_turning_points(strides: Array, periodic: bool, eps_half: Array) -> tuple[Array, Array]:
-    """Relative stress u and du/d(ln eps_half) at the start of each stroke of a motion, (..., k) each.
+    """Friction stress over sigma_fmax, u, and du/d(ln eps_half), at the start of each of k strokes, (..., k) each.
 
     Args:
-        strides: signed length of each stroke (see `Turning`), (..., k).
+        strides: signed change of strain in each stroke (see `Turning`) [1], (..., k).
         periodic: True for a steady cycle, False for a motion from rest.
-        eps_half: friction parameter [1], (..., 1).
+        eps_half: strain at which the friction stress is half of sigma_fmax [1], (..., 1).
 
     Notes:
-        In a cycle of two strokes |u| = y of `harmonic_shape`. With more strokes, Newton's method finds the u to which
-        one cycle returns. A single motion uses floats, ten times as fast as arrays of one element.
+        In a cycle of two strokes of length 2 e0, |u| = 2 x/(1 + x + sqrt(x^2 + 6 x + 1)) with x = e0/eps_half. With
+        more strokes, Newton's method finds the u to which one cycle returns. A single motion uses floats, which are ten
+        times as fast as arrays of one element.
     """
     scaled = strides / eps_half
     if strides.shape[-1] == 1 and periodic:  # at rest

@@ -18,7 +18,9 @@ def adjust(p: Values, condition: Condition) -> dict[str, Value]:
         The changed values by name: those in Pa times 1 - share erf(1 - (e0/e_max)^2), with the largest strain amplitude
         e_max so far; empty if the history is unknown.
 
-    Notes: after R. W. Ogden, D. G. Roxburgh, Proc. R. Soc. Lond. A 455 (1999) 2861, with energies for strains.
+    Notes:
+        After R. W. Ogden, D. G. Roxburgh, Proc. R. Soc. Lond. A 455 (1999) 2861, with the largest strain amplitude in
+        place of the largest strain energy.
 
     >>> from bushfit.effects.contract import RubberConditions
     >>> model = paper.with_effect("mullins_levels", {"mullins_levels.share": 0.2})

@@ -15,8 +15,8 @@ def adjust(p: Values, condition: Condition) -> dict[str, Value]:
     """Change the moduli and stresses from the reference temperature of 23 degC to the temperature of the test.
 
     Args:
-        p: parameter values by name: all moduli and stresses [Pa], and their softening [1/K], relative decrease per
-            kelvin of all but the static shear modulus mu.
+        p: parameter values by name: all moduli and stresses [Pa]; and softening [1/K], the relative decrease per kelvin
+            of all of them except the static shear modulus mu.
         condition: operating condition, with the temperature T [K].
 
     Returns:

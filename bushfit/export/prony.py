@@ -85,12 +85,14 @@ def prony_series(request: ExportRequest) -> list[PronySeries]:
     for amplitude in np.unique(prediction.amplitude):
         strain = shear_strain(request, amplitude)
 
-        def beyond_rest(omega: Array, strain: float = strain) -> Array:
-            """Complex modulus at angular frequencies [rad/s], minus the long-term modulus [Pa]."""
+        def relaxing_modulus(omega: Array, strain: float = strain) -> Array:
+            """Complex modulus minus the long-term one [Pa] at angular frequencies [rad/s] and a strain amplitude."""
             return model.stiffness(COMPOUND, omega / (2.0 * np.pi), strain, conditions=request.conditions) - long_term
 
-        arms = fitted_arms(beyond_rest, band, request.accuracy, spring=long_term, overhang_factor=_BEYOND, closest=True)
-        exact = long_term + beyond_rest(2.0 * np.pi * frequency)
+        arms = fitted_arms(
+            relaxing_modulus, band, request.accuracy, spring=long_term, overhang_factor=_BEYOND, closest=True
+        )
+        exact = long_term + relaxing_modulus(2.0 * np.pi * frequency)
         total = long_term + float(arms.modulus.sum())
         series.append(PronySeries(float(amplitude), strain, long_term, arms, exact, total, arms.modulus / total))
     return series

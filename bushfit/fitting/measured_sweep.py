@@ -269,7 +269,7 @@ class MeasuredSweep(MeasuredBase):
 
     @cached_property
     def covariance(self) -> Whitening:
-        """Covariance of the sweep's residuals in gain and phase by the noise, with which they are whitened."""
+        """Covariance of the noise of the n log gains and n phases [rad]; the residuals are whitened by it."""
         random = self.noise.scatter(self.name, self.held_value, self.step)
         if self.sweep.relative_error is not None and self.sweep.noise is None:
             random = np.maximum(np.tile(self.sweep.relative_error[self.order], (2, 1)), FLOOR)

@@ -291,7 +291,9 @@ def _is_smooth(tests: FittedTests) -> bool:
 
 
 def _errors_of_class(test: MeasuredTest, rig: RigSettings) -> Array:
-    """Change of the whitened residuals by one standard deviation of each rig error that the noise excludes, (w, n).
+    """Changes of a test's n whitened residuals by one standard deviation of each of w errors of the rig, (w, n).
+
+    The errors are those that the estimated noise does not contain; their size is the accuracy class of the rig.
 
     These are the gain error of a loop, or the gain and phase errors of each level of a sweep.
     """

@@ -101,7 +101,11 @@ class ModelInformation:
         return Information(remaining, self.squares * counts[:, None] - decrease)
 
     def total(self, counts: Array) -> Information:
-        """Fisher information of the prior and all tests together, one choice; `counts`: runs of each test, (tests,)."""
+        """Fisher information of the prior and of all runs of a set of tests.
+
+        Args:
+            counts: number of runs of each candidate test, (tests,).
+        """
         tests = self.of_runs(counts)
         products, k = tests.products.sum(axis=0, keepdims=True), len(self.prior)
         products[..., :k] += self.prior
