@@ -21,6 +21,7 @@ from bushfit.model.laws import register_file
 from bushfit.model.model import FIVE, Model
 from bushfit.model.transfer import FACTOR_SPREAD
 from bushfit.progress import track
+from bushfit.reading.headers import ZERO_TO_PEAK, split_convention
 from bushfit.reading.instruments import RECORDINGS
 from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import Loop, Sweep
@@ -291,7 +292,11 @@ def reader_keywords(
         with error_location(path, place=test.file):
             keywords["direction"] = body = place_tested(vars(test), specimens)
             if isinstance(test, SweepFile) and (amplitude := test.at_amplitude):
-                keywords["at_amplitude"] = level = parse_quantity(amplitude, body.motion.displacement_unit)
+                quantity, convention = split_convention(amplitude)
+                level = parse_quantity(quantity, body.motion.displacement_unit)
+                if convention:  # which takes precedence over that of the header
+                    level *= ZERO_TO_PEAK[convention] / ZERO_TO_PEAK[test.amplitude or "zero-to-peak"]
+                keywords["at_amplitude"] = level
                 if level <= 0.0:
                     raise CampaignError("at_amplitude is not positive", found=f'"{amplitude}"', expected="above zero")
         yield keywords

@@ -146,7 +146,7 @@ def _constant_quantity(
     state = f'state {key} = "{example}" in the campaign'
     if "block" in table.headers:
         state = f'write a [[sweeps]] table for each block with rows = {{ block = "1" }} and {key} = "{example}"'
-    other_way = hint_for_convertible_columns(table, {"period"}) if role == "frequency" else None
+    other_way = hint_for_convertible_columns(table, {"period" if role == "frequency" else "extremes"})
     raise table.header_error(
         f"the {role} of this test is not stated",
         found=f"{origin}: {' and '.join(listed)}" if found else None,

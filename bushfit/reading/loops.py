@@ -13,7 +13,7 @@ from bushfit.reading.labelled import Rows, note_not_understood
 from bushfit.reading.measurement import Floats, Loop
 from bushfit.reading.parts import OpenedFile
 from bushfit.reading.preload import parse_preload
-from bushfit.reading.si_columns import si_column
+from bushfit.reading.si_columns import quantity_above, si_column
 from bushfit.reading.source import LEAST_VALUE
 from bushfit.reading.stated import LoopFile
 from bushfit.reading.table import Table
@@ -78,6 +78,7 @@ def read_loop(
     else:
         time = test.rebuild_time(displacement)
         notes += (table.note_sampling,) if stated_rate else ()
+    unknown = note_not_understood(table, table.row_labels, None)
     return Loop(
         name or table.file.stem,
         direction,
@@ -85,7 +86,7 @@ def read_loop(
         displacement,
         force,
         test.noise,
-        test.source(table.sha256, test.temperature, (*notes, *note_not_understood(table, table.row_labels, None))),
+        test.source(table.opened.checksum.result(), test.temperature, (*notes, *unknown)),
         "time" in values or test.sampling_rate is not None,
         test.weight,
         temperature=test.temperature,
@@ -123,7 +124,7 @@ def loop_columns(table: Table, direction: Place, test: LoopFile) -> dict[str, Co
     if "time" in table.roles:
         wanted["time"] = time_column(table, direction)
     elif not test.states_time:
-        rate = table.quantity_above("m/s") or "10 mm/min"
+        rate = quantity_above(table, "m/s") or "10 mm/min"
         hint = f'or state rate = "{rate}", or frequency = "0.1 Hz" and waveform = "sine", or '
         hint += 'sampling_rate = "100 Hz", in the campaign'
         si_column(table, "time", direction, hint)

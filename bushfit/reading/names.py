@@ -69,6 +69,8 @@ _COMMA = re.compile(r"^([+-]?\d+),(?=\d+(?!\d|[.,]\d))")
 _SAMPLES = re.compile(r"^(k|M)?(?:sps|(?:s|sa|samples?|pts|points|scans?)\s?/\s?s(?:ec)?)$", re.IGNORECASE)
 #: Number with a decimal mark or exponent, and its unit, if any.
 _NUMBER_AND_UNIT = re.compile(r"(?P<number>\d[\d.,']*(?:[eE][+-]?\d+)?)\s*(?P<unit>\D.*?)\s*")
+#: Characters of the longest line of running text; chosen: a line or two of a page.
+_LONGEST_TEXT = 200
 #: Characters of the longest value above a table; chosen: a longer one is a text.
 _LONGEST_VALUE = 60
 
@@ -194,6 +196,20 @@ def labels_above(lines: Iterable[Line]) -> Labels:
     conventions = {found for line in lines if (found := _convention_in_line(line))}
     convention = conventions.pop() if len(conventions) == 1 else None
     return reduce(or_, map(_label_in_line, lines), Labels(convention=convention))
+
+
+def labels_in_text(lines: Iterable[Line]) -> Labels:
+    """Extract the temperature, and an amplitude that is peak-to-peak or rms, from running text above a table.
+
+    Either is used only if the text states one value.
+    """
+    labels = [_labels_in_name(line.text) for line in lines if len(line.text) <= _LONGEST_TEXT]
+    temperatures = {one.temperature for one in labels} - {None}
+    amplitudes = {q for one in labels for q in one.quantities if q.convention in ("peak-to-peak", "rms")}
+    return Labels(
+        tuple(amplitudes) if len(amplitudes) == 1 else (),
+        temperature=temperatures.pop() if len(temperatures) == 1 else None,
+    )
 
 
 def _convention_in_line(line: Line) -> AmplitudeConvention | None:

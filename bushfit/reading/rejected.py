@@ -161,20 +161,18 @@ def check_positive(table: Table, wanted: Mapping[str, Column], values: Mapping[s
             table.refuse(values[role] < LEAST_VALUE, wanted[role], "no rig records values this small", smallest)
 
 
-def marks_for_missing(
-    table: Table, wanted: Mapping[str, Column], values: Mapping[str, Floats]
-) -> dict[int, str | float]:
+def mark_missing(table: Table, wanted: Mapping[str, Column], values: Mapping[str, Floats]) -> bool:
     """Find numbers that mark missing values: nines beyond all others, -1 beside positive numbers, or a size of zero.
 
     Args:
-        table: table of the columns.
+        table: table of the columns, to whose marks the cells with such numbers are added.
         wanted: columns by role, with their factors to SI.
         values: values in SI by role, (n,) each.
 
     Returns:
-        Cell with such a number, as in the file, by index of its column.
+        True if there is such a number, so that the table has to be read again without its rows.
     """
-    marks: dict[int, str | float] = {}
+    is_found = False
     for role, column in ((role, column) for role, column in wanted.items() if role != "time"):
         for row in {int(values[role].argmin()), int(values[role].argmax())} if values[role].size else ():
             number = float(values[role][row] / column.scale)
@@ -184,8 +182,10 @@ def marks_for_missing(
             rest = values[role][values[role] != values[role][row]] / column.scale
             is_apart = abs(number) > _MARK_RATIO * np.abs(rest).max(initial=0.0)
             if rest.size > values[role].size / 2 and (rest.min() > 0.0 if is_size else is_apart):
-                marks[column.index] = next(islice(table.rows(), row, None))[1][column.index]
-    return marks
+                cell = next(islice(table.rows(), row, None))[1][column.index]
+                table.marks.setdefault(column.index, set()).add(cell)
+                is_found = True
+    return is_found
 
 
 def refuse_other_columns(table: Table, left_out: Iterable[FaultyRow], vocabulary: Vocabulary) -> None:

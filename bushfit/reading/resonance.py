@@ -68,7 +68,7 @@ def read_resonance(table: Table, direction: Place, base_acceleration: float | No
     bad = ~(np.isfinite(ratio) & (base > 0.0) & (ratio != 0.0))
     table.refuse(bad, wanted["frequency"], "base or mass stands still here", "two accelerations that are not zero")
     order = np.argsort(values["frequency"], kind="stable")
-    source = Source(Path(table.file.name), table.sha256)
+    source = Source(Path(table.file.name), table.opened.checksum.result())
     return ResonanceTest(table.file.stem, direction, values["frequency"][order], ratio[order], base[order], source)
 
 

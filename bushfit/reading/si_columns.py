@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
@@ -16,6 +17,9 @@ from bushfit.reading.roles import OF_MOTION, of_motion, si_unit
 
 if TYPE_CHECKING:
     from bushfit.reading.table import Table
+
+#: Quantity in a line above a table: "1 V = 200 N", "Crosshead speed: 10 mm/min".
+_QUANTITY = re.compile(r"[=:]\s*(\d+(?:[.,]\d+)?)\s*([^\s\d,;]+(?:\s*/\s*[^\s\d,;]+)?)")
 
 
 def si_column(table: Table, role: str, tested: Place, hint: str | None = None) -> Column:
@@ -69,7 +73,7 @@ def si_column(table: Table, role: str, tested: Place, hint: str | None = None) -
             f"the {label} has no unit",
             expected=f"{quantity}, such as {example}{', or an angular frequency, such as rad/s' * angular}",
             hint=f'write "{column.header} [{"rad/s" if angular else example}]" in the header, '
-            f'or units = {{ {role} = "{table.quantity_above(expected) or example}" }} in the campaign{alternative}',
+            f'or units = {{ {role} = "{quantity_above(table, expected) or example}" }} in the campaign{alternative}',
         )
     unit = column.unit or "1"
     foreign_units = ("m", "rad", "N/m", "N*m/rad") if table.motion is STRAINING else ("1", "Pa")
@@ -81,7 +85,7 @@ def si_column(table: Table, role: str, tested: Place, hint: str | None = None) -
             f"the {label} is in volts",
             expected=f"{quantity}, such as {example}",
             hint=f"state the {label} of one volt, such as units = "
-            f'{{ {role} = "{table.quantity_above(expected) or f"200 {example}"}" }} in the campaign',
+            f'{{ {role} = "{quantity_above(table, expected) or f"200 {example}"}" }} in the campaign',
         )
     if role == "amplitude" and units.is_compatible(unit, "m/s^2") and expected == "m":
         return replace(column, role="acceleration", scale=units.si_factor(unit, "m/s^2"))
@@ -139,3 +143,15 @@ def refuse_other_motion(table: Table, role: str, headers: Sequence[str] | None =
         label = role.replace("_", " ")
         problem = f"this is a test of {found}"
         raise table.header_error(problem, found=f'"{header}" for the {label}', expected=expected, hint=hint)
+
+
+def quantity_above(table: Table, unit: str) -> str | None:
+    """Find a quantity such as "0.2 mm" in the lines above the table, where it follows = or :.
+
+    Returns:
+        Number and unit as text; None if no quantity, or several, have the dimension of the SI unit `unit`.
+    """
+    matches = (match for line in table.lines_above for match in _QUANTITY.finditer(line.text))
+    matches = (match for match in matches if units.is_compatible(match[2], unit))
+    texts = dict.fromkeys(f"{match[1].replace(',', '.')} {match[2]}" for match in matches)
+    return next(iter(texts)) if len(texts) == 1 else None

@@ -26,6 +26,8 @@ _AGREEMENT = 0.02
 #: Next steps for quantities from which the user can compute a column, by kind of quantity.
 _WAYS_ON = {
     "decrement": 'divide the logarithmic decrement by pi, and write the quotient as "loss factor [-]" into the file',
+    "extremes": 'write half of maximum minus minimum as "amplitude [mm]" and "force amplitude [N]" into the file',
+    "energy": 'write the energy over (pi times the squared amplitude) as "loss stiffness [N/mm]" into the file',
     "period": 'write the reciprocal of the period as "frequency [Hz]" into the file',
     "quality": 'write the reciprocal of the quality factor as "loss factor [-]" into the file',
 }

@@ -115,7 +115,7 @@ def read_sweep(
         stiffness[selected],
         runs.repeat,
         test.noise,
-        test.source(table.sha256, temperature, (*notes, *corrections, *unknown)),
+        test.source(table.opened.checksum.result(), temperature, (*notes, *corrections, *unknown)),
         reached,
         runs.stepped,
         values["relative_error"][selected] if "relative_error" in values else None,

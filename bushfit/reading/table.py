@@ -21,14 +21,14 @@ from bushfit.reading.instruments import word_for_part
 from bushfit.reading.labelled import find_labels
 from bushfit.reading.layout import Layout, Line, is_comment, is_row, is_summary_row
 from bushfit.reading.measurement import Floats
-from bushfit.reading.names import Labels, is_remark, labels_above
+from bushfit.reading.names import Labels, is_remark, labels_above, labels_in_text
 from bushfit.reading.notation import find_first_decimal, find_numerals
 from bushfit.reading.numerals import ALL_NUMERALS, Numerals, is_like_number
 from bushfit.reading.parts import OpenedFile
 from bushfit.reading.rejected import (
     FaultyRow,
     bad_row,
-    marks_for_missing,
+    mark_missing,
     note_left_out,
     refuse_other_columns,
     row_fault,
@@ -43,8 +43,6 @@ _FIRST = 1000
 _MOST_TEXT_ROWS = 8
 #: Number of first rows that show whether a file is a table of numbers.
 _FEW_ROWS = 4
-#: Quantity in a line above a table: "1 V = 200 N", "Crosshead speed: 10 mm/min".
-_QUANTITY = re.compile(r"[=:]\s*(\d+(?:[.,]\d+)?)\s*([^\s\d,;]+(?:\s*/\s*[^\s\d,;]+)?)")
 #: Mark of a footnote in a header, such as "Amplitude¹ [mm]".
 _FOOTNOTE_MARK = re.compile("[\u00b9\u00b2\u00b3\u2074\u2020\u2021]")
 #: Largest number of characters of a remark that is quoted.
@@ -86,15 +84,12 @@ class Table:
     clocks: frozenset[int] = field(default=frozenset(), kw_only=True)
     marks: dict[int, set[str | float]] = field(default_factory=dict, kw_only=True)
 
-    @cached_property
-    def numerals(self) -> Numerals:
-        """Notation of the numbers in the columns whose quantity is known."""
-        return find_numerals(self)
-
-    @cached_property
-    def first_decimal(self) -> str | None:
-        """Decimal mark of the first thousand numbers; None if they leave it open."""
-        return find_first_decimal(self)
+    #: Notation of the numbers in the columns whose quantity is known.
+    numerals = cached_property(find_numerals)
+    #: Decimal mark of the first thousand numbers; None if they leave it open.
+    first_decimal = cached_property(find_first_decimal)
+    #: Columns that state direction, specimen_number and run of each row: index and texts, (n,), by these keys.
+    row_labels = cached_property(find_labels)
 
     @property
     def file(self) -> Path:
@@ -255,7 +250,7 @@ class Table:
     @cached_property
     def labels_above(self) -> Labels:
         """Labels in the lines above the table, such as a temperature."""
-        return labels_above(self.lines_above)
+        return labels_above(self.lines_above) | labels_in_text(self.lines_above)
 
     @cached_property
     def remarks(self) -> tuple[str, ...]:
@@ -270,17 +265,6 @@ class Table:
         if hidden := [number for number in self.source.hidden if number > self.layout.header_line]:
             sentences.append(f"{len(hidden)} rows from row {hidden[0]} on are hidden in the workbook, and are read too")
         return tuple(sentences)
-
-    def quantity_above(self, unit: str) -> str | None:
-        """Find a quantity such as "0.2 mm" in the lines above the table, where it follows = or :.
-
-        Returns:
-            Number and unit as text; None if no quantity, or several, have the dimension of the SI unit `unit`.
-        """
-        matches = (match for line in self.lines_above for match in _QUANTITY.finditer(line.text))
-        matches = (match for match in matches if units.is_compatible(match[2], unit))
-        texts = dict.fromkeys(f"{match[1].replace(',', '.')} {match[2]}" for match in matches)
-        return next(iter(texts)) if len(texts) == 1 else None
 
     @cached_property
     def sampling_rate(self) -> float | None:
@@ -298,19 +282,8 @@ class Table:
     @property
     def note_sampling(self) -> str:
         """Note for the user that the time comes from the sampling rate above the table."""
-        return (
-            f"the file has no time: its rows are {self.sampling_rate:.6g} a second, as the lines above the table state"
-        )
-
-    @property
-    def sha256(self) -> str:
-        """SHA-256 of the file in hexadecimal digits."""
-        return self.opened.checksum.result()
-
-    @cached_property
-    def row_labels(self) -> Mapping[str, tuple[int, Sequence[str]]]:
-        """Columns that state direction, specimen_number and run of each row: index and texts, (n,), by these keys."""
-        return find_labels(self)
+        rate = f"{self.sampling_rate:.6g} a second"
+        return f"the file has no time: its rows are {rate}, as the lines above the table state"
 
     def agrees(self, role: str, expected: str) -> bool:
         """True if there is a column for a role such as "force", whose unit has the dimension of the unit `expected`."""
@@ -336,9 +309,7 @@ class Table:
         if left_out:
             refuse_other_columns(table, left_out, Vocabulary(of_motion(self.names, self.motion)))
         values = {role: np.concatenate([np.empty(0), *(part.pop(role) for part in parts)]) for role in wanted}
-        if marks := marks_for_missing(table, wanted, values):
-            for index, cell in marks.items():
-                self.marks.setdefault(index, set()).add(cell)
+        if mark_missing(table, wanted, values):
             return self.read(wanted, fewest_rows=fewest_rows)
         count = len(next(iter(values.values())))
         notes = (*self.notes, *self.remarks, *note_left_out(table, left_out, count))
