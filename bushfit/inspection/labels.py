@@ -147,11 +147,12 @@ def _constant_quantity(
     if "block" in table.headers:
         state = f'write a [[sweeps]] table for each block with rows = {{ block = "1" }} and {key} = "{example}"'
     other_way = hint_for_convertible_columns(table, {"period" if role == "frequency" else "extremes"})
+    counting = ', with amplitude = "peak-to-peak" if it counts so' if role == "amplitude" else ""
     raise table.header_error(
         f"the {role} of this test is not stated",
         found=f"{origin}: {' and '.join(listed)}" if found else None,
         expected=f"a column for the {role}, or one number with its unit in the name of the file",
-        hint=other_way or f"{state}, or name the column: {columns_key(table, role, expected)}",
+        hint=other_way or f"{state}, or name the column: {columns_key(table, role, expected)}{counting}",
     )
 
 

@@ -73,6 +73,20 @@ EXPORTS: dict[str, Export] = {
         sweep("Frequency [Hz]|Amplitude [mm]|K* [N/mm]|tan delta", F, 0.5**0.5 * A, K, ETA), stated={"amplitude": "rms"}
     ),
     "damping": Export(sweep(USUAL + "Damping [-]", F, A, K, ETA), None, ["loss_factor", "damping_ratio"]),
+    "peak to peak in running text": Export(
+        "EPDM bushing at 23 degC, 0.4 mm peak-to-peak\n" + sweep("f [Hz]|K* [N/mm]|tan delta", *(x[A == 0.1] for x in (F, K, ETA))),
+        words=["amplitude 0.2 mm, half of 0.4 mm, temperature 23 degC"],
+        reference={"frequency": F[A == 0.1], "amplitude": 0 * F[A == 0.1] + 2e-4, "stiffness": 1e3 * STIFFNESS[A == 0.1]},
+    ),
+    **{
+        f"convert {header}": Export(sweep(f"f [Hz]|A [mm]|K* [N/mm]|{header}", F, A, K, ETA), None, [words])
+        for header, words in (("Dissipated energy [mJ]", "loss stiffness [N/mm]"), ("psi [-]", "damping_ratio = "), ("Impedance [N s/mm]", "damping_ratio = "))
+    },
+    "maximum and minimum": Export(sweep("f [Hz]|Max Disp (mm)|Min Disp (mm)|Phase (deg)", F, A, -A, PHASE), None, ["half of maximum minus minimum"]),
+    "stated as peak-to-peak": Export(
+        sweep("f [Hz]|K* [N/mm]|tan delta", *(x[A == 0.1] for x in (F, K, ETA))), stated={"at_amplitude": "0.4 mm p-p"},
+        reference={"frequency": F[A == 0.1], "amplitude": 0 * F[A == 0.1] + 2e-4, "stiffness": 1e3 * STIFFNESS[A == 0.1]},
+    ),
     "D": Export(sweep(USUAL + "D [-]", F, A, K, ETA), None, ["loss_factor", "damping_ratio"]),
     "d is a damping coefficient by its unit": Export(sweep("f [Hz]|s0 [mm]|c* [N/mm]|d [N s/mm]", F, A, K, DAMPING), words=["by its unit"]),
     "snake case": Export(sweep("freq_hz|amp_um_pp|kdyn_n_per_mm|loss_angle_deg", F, 2e3 * A, K, PHASE)),

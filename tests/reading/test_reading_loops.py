@@ -52,17 +52,10 @@ def test_a_quote_left_open_in_a_remark_takes_no_rows(first, last, tmp_path):
 
 def test_a_force_of_the_other_sign_is_turned(tmp_path):
     loop = loop_from(LOOP, tmp_path)
-    text = "\n".join(
-        [
-            LOOP_HEADER,
-            *(
-                f"{t:.9g},{1e3 * x:.9g},{-f:.9g}"
-                for t, x, f in zip(loop.time, loop.displacement, loop.force, strict=True)
-            ),
-        ]
+    turned = loop_from(
+        re.sub(r",(-?)([\d.]+)(?=\n|$)", lambda m: f",{'' if m[1] else '-'}{m[2]}", LOOP), tmp_path, force_sign=-1
     )
-    turned = loop_from(text, tmp_path, force_sign=-1)
-    np.testing.assert_allclose(turned.force, loop.force, rtol=1e-6, atol=1e-6)
+    assert np.array_equal(turned.force, loop.force)
     with pytest.raises(BushfitError, match="the force falls where the displacement rises"):
         loop_from(LOOP, tmp_path, force_sign=-1)
 
