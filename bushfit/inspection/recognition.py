@@ -85,9 +85,9 @@ def recognize_table(file: Path, test_options: Mapping[str, Any]) -> tuple[Table,
     lacking = missing_role(best, is_sweep=is_sweep) or "force"
     units = {"displacement": "m", "force": "N", "stiffness": "N/m", "storage_stiffness": "N/m", "phase": "rad"}
     advice = hint_for_convertible_columns(best)
-    if set(best.roles) == {"time", "displacement"}:
-        advice = "a displacement alone is a history for bushfit respond; a test needs a column for the force, too"
     column = columns_key(best, lacking, units.get(lacking, "1"))
+    if set(best.roles) == {"time", "displacement"} and '"..."' in column:
+        advice = "a displacement alone is a history for bushfit respond; a test needs a column for the force, too"
     raise best.header_error(
         "the columns are not those of a test",
         kind=NoTestError,

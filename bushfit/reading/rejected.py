@@ -172,7 +172,7 @@ def mark_missing(table: Table, wanted: Mapping[str, Column], values: Mapping[str
     Returns:
         True if there is such a number, so that the table has to be read again without its rows.
     """
-    is_found = False
+    marks = list[tuple[int, str | float]]()
     for role, column in ((role, column) for role, column in wanted.items() if role != "time"):
         for row in {int(values[role].argmin()), int(values[role].argmax())} if values[role].size else ():
             number = float(values[role][row] / column.scale)
@@ -182,10 +182,10 @@ def mark_missing(table: Table, wanted: Mapping[str, Column], values: Mapping[str
             rest = values[role][values[role] != values[role][row]] / column.scale
             is_apart = abs(number) > _MARK_RATIO * np.abs(rest).max(initial=0.0)
             if rest.size > values[role].size / 2 and (rest.min() > 0.0 if is_size else is_apart):
-                cell = next(islice(table.rows(), row, None))[1][column.index]
-                table.marks.setdefault(column.index, set()).add(cell)
-                is_found = True
-    return is_found
+                marks.append((column.index, next(islice(table.rows(), row, None))[1][column.index]))
+    for index, cell in marks:  # not earlier: the rows depend on them
+        table.marks.setdefault(index, set()).add(cell)
+    return bool(marks)
 
 
 def refuse_other_columns(table: Table, left_out: Iterable[FaultyRow], vocabulary: Vocabulary) -> None:
