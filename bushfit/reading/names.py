@@ -199,17 +199,10 @@ def labels_above(lines: Iterable[Line]) -> Labels:
 
 
 def labels_in_text(lines: Iterable[Line]) -> Labels:
-    """Extract the temperature, and an amplitude that is peak-to-peak or rms, from running text above a table.
-
-    Either is used only if the text states one value.
-    """
+    """Extract the temperature from running text above a table, if the text states one."""
     labels = [_labels_in_name(line.text) for line in lines if len(line.text) <= _LONGEST_TEXT]
     temperatures = {one.temperature for one in labels} - {None}
-    amplitudes = {q for one in labels for q in one.quantities if q.convention in ("peak-to-peak", "rms")}
-    return Labels(
-        tuple(amplitudes) if len(amplitudes) == 1 else (),
-        temperature=temperatures.pop() if len(temperatures) == 1 else None,
-    )
+    return Labels(temperature=temperatures.pop() if len(temperatures) == 1 else None)
 
 
 def _convention_in_line(line: Line) -> AmplitudeConvention | None:
