@@ -162,7 +162,7 @@ def check_positive(table: Table, wanted: Mapping[str, Column], values: Mapping[s
 
 
 def mark_missing(table: Table, wanted: Mapping[str, Column], values: Mapping[str, Floats]) -> bool:
-    """Find numbers that mark missing values: nines beyond all others, -1 beside positive numbers, or a size of zero.
+    """Find numbers that mark missing values: nines beyond all others, -1 beside positive numbers, a stiffness of zero.
 
     Args:
         table: table of the columns, to whose marks the cells with such numbers are added.
@@ -176,7 +176,7 @@ def mark_missing(table: Table, wanted: Mapping[str, Column], values: Mapping[str
     for role, column in ((role, column) for role, column in wanted.items() if role != "time"):
         for row in {int(values[role].argmin()), int(values[role].argmax())} if values[role].size else ():
             number = float(values[role][row] / column.scale)
-            is_size = number == -1.0 or (number == 0.0 and role in POSITIVE)
+            is_size = number == -1.0 or (number == 0.0 and role in ("stiffness", "storage_stiffness"))
             if not is_size and (abs(number) < 99.0 or not set(f"{abs(number):.9g}") <= set("9.")):
                 continue
             rest = values[role][values[role] != values[role][row]] / column.scale
