@@ -31,6 +31,8 @@ _MISSING = frozenset(WORDS["rows_of"]["missing"])
 #: Smallest ratio of nines that mark a missing value to the largest other number; chosen: outliers are rarely nines.
 _MARK_RATIO = 3.0
 
+#: Roles of a stiffness, of which zero is no measurement.
+_SIZES = ("stiffness", "storage_stiffness")
 #: Roles whose values must be positive.
 POSITIVE = (
     *("frequency", "amplitude", "amplitude_reached", "stiffness", "storage_stiffness", "force_amplitude"),
@@ -176,7 +178,7 @@ def mark_missing(table: Table, wanted: Mapping[str, Column], values: Mapping[str
     for role, column in ((role, column) for role, column in wanted.items() if role != "time"):
         for row in {int(values[role].argmin()), int(values[role].argmax())} if values[role].size else ():
             number = float(values[role][row] / column.scale)
-            is_size = number == -1.0 or (number == 0.0 and role in ("stiffness", "storage_stiffness"))
+            is_size = number == -1.0 or (number == 0.0 and role in _SIZES and not column.logarithm)
             if not is_size and (abs(number) < 99.0 or not set(f"{abs(number):.9g}") <= set("9.")):
                 continue
             rest = values[role][values[role] != values[role][row]] / column.scale

@@ -117,8 +117,7 @@ def columns_key(table: Table, role: str, unit: str) -> str:
         and unit != "1"
         and units.is_compatible(split_unit(header)[1] or parse_unit(in_row)[0], unit)
     ]
-    keys = (role, "damping_ratio") if role == "loss_factor" else (role,)  # half as large: the user has to choose
-    return " or ".join(f'columns = {{ {key} = "{header}" }}' for key in keys for header in fitting[:3] or ["..."])
+    return " or ".join(f'columns = {{ {role} = "{header}" }}' for header in fitting[:3] or ["..."])
 
 
 def refuse_other_motion(table: Table, role: str, headers: Sequence[str] | None = None) -> None:
