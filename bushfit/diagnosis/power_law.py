@@ -336,8 +336,6 @@ class _Grid:
 def _settled_grid(fitted: Evidence, term: Term, plain: LinearModel, model: Model, bounds: Bounds) -> _Grid | None:
     """Find the powers of frequency and amplitude nearest to a gap, on a grid that narrows about the likeliest pair.
 
-    After each step the parameters of the model and the amount of the power law are fitted again.
-
     Args:
         fitted: the fitted model and the tests.
         term: complex stiffness that is added to the model, with its unit.
@@ -346,7 +344,7 @@ def _settled_grid(fitted: Evidence, term: Term, plain: LinearModel, model: Model
         bounds: limits of parameters inside their general limits.
 
     Returns:
-        The last grid, linearised about the fitted model and power law; None without convergence.
+        The last grid, about the model and the amount of the law refitted at each step; None without convergence.
     """
     # at first around the measured stiffness, by which a term of any size is linear
     value = np.concatenate([test.measured - test.noise_free(model).measured for test, _ in term.tests])
