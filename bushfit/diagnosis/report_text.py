@@ -30,6 +30,7 @@ from bushfit.diagnosis.record import Diagnosis, MisfitRegion, NamedCause
 from bushfit.diagnosis.search import Search
 from bushfit.diagnosis.verdict import Composition, Finding, decide_verdict
 from bushfit.effects import get_effect, qualified_name
+from bushfit.effects.mistakes import get_candidate
 from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.fitting.preparation import split_by_kind, with_gain_weighting
 from bushfit.model.covariance import Covariance
@@ -196,8 +197,8 @@ class DiagnosisWriter:
         leader, advice = candidates[0] if candidates else first, self._deciding_test()
         if claim := leader.best.claim:
             advice = f"check the records of the tests; {'; '.join(claim.corrections)}"
-        elif leader.names and not advice:
-            advice = get_effect(leader.names[0]).confirmed_by
+        elif decided := [*(x for x in finding.leads if get_candidate(x).twins), *(() if advice else leader.names)]:
+            advice = get_effect(decided[0]).confirmed_by  # of a lead: whether it is of the bushing or of the rig
         if is_ambiguous:
             sentences = [undecided_text(reported), *closing]
             others = tuple(label(composition) for composition in reported if composition is not leader)

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from rigged import LEVELS, PLAN, Fitted, asked, changed
 from scipy.stats import binomtest
+from test_report_text import TURNED
 from test_schemas import complaints
 
 from bushfit.campaign.campaign import Campaign
@@ -310,3 +311,11 @@ def test_intervals_hold_the_phase_and_the_powers_in_95_of_100(measured, fitted):
     ends = binomtest(sum(every), len(every)).proportion_ci()
     assert ends.low <= 0.97
     assert ends.high >= 0.93
+
+
+def test_what_nearly_all_explanations_contain_is_tested_next_if_the_rig_may_have_it(measured):
+    campaign = with_relaxation(measured({"rig_compliance": {"compliance": 8e-8}}, TURNED), 0.04)
+    found = asked(replace(campaign, rig=RigSettings(gain_error=5e-4, phase_error=5e-4)))
+    assert found.verdict == "described"
+    assert "leads: sleeve_compliance" in found.summary
+    assert "steel dummy" in found.next_test
