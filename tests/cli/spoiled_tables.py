@@ -42,8 +42,8 @@ IN_LOOP = [
 IN_SWEEP = [
     ("no file", lambda _: None, "sweep.csv: there is no such file", "an existing file"),
     ("header only", kept(1), "sweep.csv: too few rows", "at least 3"),
-    ("frequency of zero", row(2, "5,", "0,"), 'sweep.csv, line 2, column "frequency [Hz]": the frequency is not positive', "a number above zero"),
-    ("amplitude of zero", row(2, ",0.1,", ",0,"), 'sweep.csv, line 2, column "amplitude [mm]": the amplitude is not positive', "a number above zero"),
+    ("frequency below zero", row(2, "5,", "-5,"), 'sweep.csv, line 2, column "frequency [Hz]": the frequency is not positive', "a number above zero"),
+    ("amplitude below zero", row(2, ",0.1,", ",-0.1,"), 'sweep.csv, line 2, column "amplitude [mm]": the amplitude is not positive', "a number above zero"),
     ("an amplitude of metres", every("amplitude [mm]", "amplitude [m]"), "campaign.toml, sweep: no rubber bears the amplitude of this test", "m, axial: a strain of "),
     ("negative stiffness", row(2, "505", "-505"), 'sweep.csv, line 2, column "stiffness [N/mm]": the stiffness is not positive', "a number above zero"),
     ("loss factor as an angle", every("loss factor [-]", "loss factor [deg]"), 'sweep.csv, line 1, column "loss factor [deg]": the unit does not fit', "a ratio, such as %"),
@@ -76,7 +76,7 @@ IN_RESONANCE = [
     ("the phase is zero throughout", column(3, "0"), "shaker.csv: the phases show no loss with either sign", "check the unit of the phases"),
     ("degrees as radians", row(1, "phase [deg]", "phase [rad]"), "shaker.csv: the phases show no loss with either sign", "check the unit of the phases"),
     ("base and mass swapped", row(1, "base acceleration [g],mass acceleration [g]", "mass acceleration [g],base acceleration [g]"), "shaker.csv: the ", "check "),
-    ("the base stands still in a row", row(9, ",0.1000,", ",0.0000,"), 'shaker.csv, line 9, column "base acceleration [g]": the base acceleration is not positive', "a number above zero"),
+    ("the base has a negative acceleration", row(9, ",0.1000,", ",-0.1000,"), 'shaker.csv, line 9, column "base acceleration [g]": the base acceleration is not positive', "a number above zero"),
     ("a row short", kept(11), "shaker.csv: too few rows", "at least 12"),
     ("the mass moves as the base does", lambda lines: column(2, "0.1000")(column(3, "-1")(lines).splitlines()), "shaker.csv: ", "check "),
 ]
