@@ -86,13 +86,22 @@ def undecided_text(reported: Sequence[Composition]) -> str:
 
 
 def causes_text(candidates: Sequence[Composition], finding: Finding) -> list[str]:
-    """Sentences on the possible causes of a gap: candidates with probabilities, and leads, or mistakes to check."""
+    """List sentences on the possible causes of a gap.
+
+    Args:
+        candidates: explanations with causes, the most probable first.
+        finding: verdict, with all explanations and leads.
+
+    Returns:
+        The candidates with their probabilities, and the leads that no candidate has; or the mistakes to check.
+    """
     claims = {c.best.claim.key if c.best.claim else None: c.best.claim for c in finding.reported}
     if all(claims.values()):
         return [f"check first whether {' or whether '.join(claim.sentence for claim in claims.values() if claim)}"]
     names = [f"{label(candidate)} ({format_probability(candidate.probability)})" for candidate in candidates]
     sentences = [f"the cause may be {' or '.join(names)}"] if names else []
-    sentences += [f"leads: {' and '.join(finding.leads)}"] if finding.leads else []
+    leads = [name for name in finding.leads if not any(name in candidate.causes for candidate in candidates)]
+    sentences += [f"leads: {' and '.join(leads)}"] if leads else []
     return sentences or ["no known effect explains the gap"]
 
 

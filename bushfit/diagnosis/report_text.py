@@ -178,7 +178,7 @@ class DiagnosisWriter:
         """Diagnosis of a gap without a certain cause: what closes it, candidates for the cause, and a deciding test.
 
         Effects that all probable explanations contain, and a smooth correction for the rest, close the gap, unless
-        tests or records may be wrong. The candidates are the reported explanations with causes that are not leads.
+        tests or records may be wrong. The candidates are the reported explanations with causes.
         """
         finding, reported, verdict = self.finding, self.finding.reported, self.finding.verdict
         bounds = self.request.data.bounds
@@ -193,7 +193,7 @@ class DiagnosisWriter:
                 return replace(self, finding=replace(finding, names=())).diagnosis()
         rest = "the rest of the gap" if finding.names else "the gap"
         closing = [f"a smooth correction closes {rest}: {gap.sentence}"] if gap else []
-        candidates = [c for c in reported if c.probability > 1.0 - NAMED and {*c.causes} - {*finding.leads}]
+        candidates = [c for c in reported if c.probability > 1.0 - NAMED and c.causes]
         leader, advice = candidates[0] if candidates else first, self._deciding_test()
         if claim := leader.best.claim:
             advice = f"check the records of the tests; {'; '.join(claim.corrections)}"
