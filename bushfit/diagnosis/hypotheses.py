@@ -215,14 +215,8 @@ class SearchState:
     @property
     def likeliest_deviation(self) -> float:
         """Likeliest standard deviation of the compound's deviation, relative to |K|; 0 if none is more probable."""
-        bent = self.linear.evidence.with_compound
-        return bent.likeliest if bent and self.log_odds_of_deviation > 0.0 else 0.0
-
-    @property
-    def log_odds_of_deviation(self) -> float:
-        """Natural log of the odds that the compound deviates from the model's laws beside these explanations."""
         plain, bent = self.linear.evidence, self.linear.evidence.with_compound
-        return bent.log_evidence - plain.log_evidence if bent else -np.inf
+        return bent.likeliest if bent and bent.log_evidence > plain.log_evidence else 0.0
 
     def free_columns(self, deviation: float) -> Array | None:
         """Changes of the residuals by faulty parts of the tests and the compound, left free in refits of effects.

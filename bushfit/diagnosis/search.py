@@ -38,9 +38,6 @@ _SETTLED = 8
 _CLAIMS, _FAULTY_PARTS = 4, 2
 #: Natural log of the odds below its state within which an effect is refitted; for time.
 _SLIGHT = 3.0
-#: Natural log of the odds of a deviation of the compound above which no effect is refitted without it: the linear model
-#: around the fit with the deviation has shown already that the effect alone leaves a gap. Half of `refit.FAR`.
-_HOPELESS = 30.0
 #: Number of rivals that are refitted from the values of the most probable state in each round; for time.
 _RIVALS = 6
 #: Attributes of a test that a record determines at each point.
@@ -183,8 +180,8 @@ class Search:
     def _with_effects(self, state: SearchState, names: Sequence[str], depth: int) -> list[SearchState]:
         """Extend a state of the search by each of the named effects, refitted with all parameters.
 
-        Each effect is refitted with the compound's likeliest deviation left free, and without a deviation unless this
-        is hopeless, because each hypothesis is weighed around its own fit; the search goes on from the more probable.
+        Each effect is refitted with the compound's likeliest deviation left free and without a deviation, because each
+        hypothesis is weighed around its own fit; the search goes on from the more probable fit.
 
         Args:
             state: fitted model with some explanations.
@@ -197,12 +194,7 @@ class Search:
         start = self.request.start if not state.effects and state.evidence.reduced_chi_square > _BENT else {}
         grown: dict[str, SearchState] = {}
         for deviation in dict.fromkeys((state.likeliest_deviation, 0.0)):
-            tried = {
-                name: model
-                for name, model in models.items()
-                if name not in grown or grown[name].log_odds_of_deviation < _HOPELESS
-            }
-            for name, evidence in self._refitted(state, tried, start, state.free_columns(deviation)):
+            for name, evidence in self._refitted(state, models, start, state.free_columns(deviation)):
                 candidate = self._visit(state.with_effect(name, evidence, self._log_odds("effect", name, depth)))
                 if name not in grown or candidate.log_posterior > grown[name].log_posterior:
                     grown[name] = candidate
