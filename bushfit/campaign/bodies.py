@@ -18,7 +18,7 @@ def _check_name(name: str) -> str:
         ValueError: a direction, or another table in the results folder, has this name.
     """
     if name in (*Direction, "loops", "sweeps", "gap", "candidates", "measured", "shear"):
-        expected = "a name of its own: its tables are named after it"
+        expected = "a unique name, because the tables are named after it"
         raise ValueError(CampaignError("another table has this name", found=name, expected=expected))
     return name
 

@@ -284,7 +284,7 @@ def reader_keywords(
     counts = Counter(sources)
     for test, source, name in zip(tests, sources, _test_names(tests), strict=True):
         if (identity := (*source, test.direction, test.specimen_number, *test.rows.items())) in listed_tests:
-            expected = "each file once, or each sheet of it"
+            expected = "each file, or each sheet of a file, once"
             raise CampaignError("a file is listed twice", file=path, found=test.file, expected=expected)
         listed_tests.add(identity)
         shared = counts[source] > 1

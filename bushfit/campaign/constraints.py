@@ -63,7 +63,7 @@ def _require_compatible_keys(setting: ParameterSetting) -> None:
     keys += ["vary = false"] * (not setting.vary and bool(keys or setting.prior))
     if len(keys) > 1 or (setting.prior and not setting.vary):
         found = ", ".join([*keys, *(["prior"] * bool(setting.prior))])
-        expected = "equal or expression alone, or a prior of a parameter that varies"
+        expected = "equal or expression as the only key, or a prior of a parameter that varies"
         raise CampaignError("these keys exclude each other", found=found, expected=expected)
 
 
@@ -128,9 +128,9 @@ def _tie(campaign: Campaign, name: str, setting: ParameterSetting) -> Tie:
             get_places(place, campaign.specimens)
     unit, equal_unit = get_parameter(name).unit, get_parameter(equal or name).unit
     if unit != equal_unit:
-        found, expected = f"{name} [{unit}], {equal} [{equal_unit}]", "two parameters of one unit"
-        hint = f'expression = "{equal}" takes the value in SI units'
-        raise CampaignError("parameters of different units are not equal", found=found, expected=expected, hint=hint)
+        found, expected = f"{name} [{unit}], {equal} [{equal_unit}]", "two parameters of the same unit"
+        hint = f'expression = "{equal}" uses the value in SI units'
+        raise CampaignError("parameters of different units cannot be equal", found=found, expected=expected, hint=hint)
     return tie
 
 

@@ -51,7 +51,7 @@ def without_copied_tests(tests: Sequence[_Test]) -> list[_Test]:
     remaining = []
     for first, *copies in group_copies(tests):
         files = [copy.source.file.name if copy.source else copy.name for copy in copies]
-        remaining.append(_with_note(first, f"the same data are in {_listed(files)}: used once") if files else first)
+        remaining.append(_with_note(first, f"{_listed(files)} with the same data: used once") if files else first)
     return remaining
 
 
@@ -80,8 +80,8 @@ def without_copied_repeats(sweep: Sweep) -> Sweep:
     columns = {name: getattr(sweep, name) for name in names}
     columns = {name: values[~is_copy] for name, values in columns.items() if isinstance(values, np.ndarray)}
     note = (
-        f"{points} points of repeat{'s' * (len(repeats) > 1)} {_listed([*map(str, repeats)])} are those of an earlier "
-        "repeat in all digits: used once, and left out of the numbers of data rows"
+        f"{points} points of repeat{'s' * (len(repeats) > 1)} {_listed([*map(str, repeats)])} equal points of an "
+        "earlier repeat in all digits: they are used once, and data rows are numbered without the copies"
     )
     return _with_note(replace(sweep, **columns), note)
 

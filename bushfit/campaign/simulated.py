@@ -148,8 +148,8 @@ class SimulatedResonance(SimulatedTest):
             raise ValueError(CampaignError("this cannot carry a mass", found=str(self.direction), expected=expected))
         usable = [f for f in self.frequencies if 1.0 / LARGEST_SHAKEN <= f <= LARGEST_SHAKEN]
         if len(usable) < max(FEWEST_ROWS, len(self.frequencies)):
-            expected = f"at least {FEWEST_ROWS}, through the resonance"
-            raise ValueError(CampaignError("no frequencies of a shaker", found=f"{len(usable)}", expected=expected))
+            expected = f"at least {FEWEST_ROWS}, from below to above the resonance"
+            raise ValueError(CampaignError("too few shaker frequencies", found=f"{len(usable)}", expected=expected))
 
 
 @dataclass(frozen=True)
@@ -177,9 +177,9 @@ class SimulatedRecord(SimulatedTest):
         if len(self.amplitudes) != needed or (self.rms is None) != (self.motion == "sines"):
             found = f"{len(self.amplitudes)} amplitudes, {'no' if self.rms is None else 'an'} rms"
             expected = "an amplitude for each frequency of sines and random, and rms for random and road"
-            raise ValueError(CampaignError("these keys do not state a motion", found=found, expected=expected))
+            raise ValueError(CampaignError("these keys do not describe a motion", found=found, expected=expected))
         if min(np.diff(self.frequencies), default=self.motion == "sines") <= 0.0:
-            raise ValueError(CampaignError("these frequencies are no band", expected="two or more, in ascending order"))
+            raise ValueError(CampaignError("these frequencies are not a band", expected="two or more, ascending"))
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ _DEEP_KEY = re.compile(rb"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*
 
 #: Hint for an error of the TOML parser, by the first words of its message.
 _WAYS = {
-    ("Unescaped", "Invalid hex"): "write / for each \\ of a path, or the text in single quotes",
+    ("Unescaped", "Invalid hex"): "write / instead of \\ in a path, or put the path in single quotes",
     ("Cannot",): "name each table and key once; list several tests under [[loops]] or [[sweeps]], in two brackets",
 }
 

@@ -121,15 +121,15 @@ class Bushing:
                 place="inner_radius, outer_radius",
                 found=f"{1e3 * self.inner_radius:g} mm and {1e3 * self.outer_radius:g} mm",
                 expected="inner_radius below outer_radius",
-                hint="check that radii were given, not diameters, and that they are not swapped",
+                hint="check that the values are radii, not diameters, and that inner and outer are not swapped",
             )
         if self.shape == "calibrated" and self.correction is None:
             raise ModelError(
-                "no finite elements were computed for this shape",
+                "the calibrated formulas do not cover this shape",
                 place="shape",
                 found='"calibrated" for inner/outer = {:.3g}, length/outer = {:.3g}'.format(*self.proportions),
                 expected="inner/outer 0.15 to 0.92 and length/outer 0.1 to 60",
-                hint='check the units of the geometry, or take shape = "paper"',
+                hint='check the units of the geometry, or state shape = "paper"',
             )
 
     @property
@@ -355,8 +355,8 @@ def _require_bushing(bushing: Bushing | None, place: Place) -> Bushing:
         raise ModelError(
             "there is no bushing",
             place=str(place),
-            expected="a [bushing] with its radii and length, which a direction belongs to",
-            hint="bushfit predict MODEL.json --bushing other.toml carries the compound of a model to a bushing",
+            expected="a [bushing] table with radii and length: each direction belongs to a bushing",
+            hint="bushfit predict MODEL.json --bushing other.toml predicts a bushing of the same compound",
         )
     return bushing
 

@@ -104,10 +104,10 @@ def gaps(motion: RecordedChannel, record: Loop) -> Iterator[str]:
     if not wide.any():
         return
     first, count = int(np.argmax(wide)), int(wide.sum())
-    channel, size = "time", f"{steps[first]:.3g} s without a row, else mostly {usual:.3g} s"
+    channel, size = "time", f"{steps[first]:.3g} s without a row; usual time step {usual:.3g} s"
     if not record.has_recorded_time:
         ends = f"{motion.format_row(first)} to {motion.format_row(first + 1)} {motion.unit}"
-        channel, size = "the motion", f"the {motion.name} jumps from {ends} at once"
+        channel, size = "the motion", f"the {motion.name} jumps from {ends} in one row"
     yield f"{count} gap{'s' * (count > 1)} in {channel}, the first after data row {first + 1}: {size}"
 
 
@@ -127,7 +127,7 @@ def stuck_rows(motion: RecordedChannel, force: RecordedChannel) -> Iterator[str]
     if stuck:
         longest = max(stuck, key=lambda rows: rows.stop - rows.start)
         rows = f"{longest.stop - longest.start} rows from data row {longest.start + 1} on"
-        yield f"{rows} repeat one {motion.name} and {force.name}, although the motion continued"
+        yield f"{rows} repeat the same {motion.name} and {force.name}, although the motion continued"
 
 
 def cut_off_ends(channel: RecordedChannel) -> Iterator[str]:

@@ -190,8 +190,8 @@ def split_rows(source: TestSource) -> tuple[list[TestSource], list[str]]:
         if is_direction and all(same_text(str(test_options.get(key, text)), text) for key, text in keys.items()):
             tests.append(replace(source, test_options={**test_options, **keys, **run}))
         else:
-            why = "as stated" if is_direction else "no known direction"
-            left_out.append(f"{source}: its rows of {', '.join(texts)}, {why}")
+            why = "other values were stated" if is_direction else "the direction is unknown"
+            left_out.append(f"{source}: rows of {', '.join(texts)} are not used: {why}")
     return (tests, left_out) if tests else ([source], [])
 
 
@@ -270,7 +270,7 @@ def with_contradictions(files: Sequence[Inspection]) -> list[Inspection]:
     for copies in groups:
         for test in copies if len(copies) > 1 else ():
             same_data = " and ".join(names[id(copy)] for copy in copies if copy is not test)
-            oddities[id(test)].append(f"the same data are in {same_data}: a campaign counts them once")
+            oddities[id(test)].append(f"the same data are in {same_data}: a campaign uses these data once")
     placed = [inspection for inspection in files if inspection.direction is not None and inspection.kind != "history"]
     for part in dict.fromkeys(inspection.part for inspection in placed):
         tests = [inspection.measured for inspection in placed if inspection.part == part]

@@ -57,7 +57,7 @@ def describe_loop(loop: Loop, labels: Labels) -> Findings:
     amplitude, mean_motion, mean_force = prepared.amplitude, prepared.coefficients[0].real, float(prepared.force.mean())
     noise = f"{number(100 * prepared.noise / half_force, 2)} % of half the {names[1]} range, per row"
     if prepared.noise > half_force:
-        noise = "not known: the record is no steady loop"
+        noise = "not known: the record is not a steady loop"
     facts = {
         "cycles": f"{prepared.cycles:.3g}, {'the first from rest' if prepared.from_rest else 'treated as steady'}",
         "frequency": f"{prepared.frequency:.4g} Hz, {waveform(prepared.coefficients)}",

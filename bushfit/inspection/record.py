@@ -143,9 +143,9 @@ class Inspection:
         if isinstance(self.direction, Specimen) and self.direction.kind == "modulus":
             meaning, alternative = "the engineering shear strain", "tension"
             if self.direction.strain == "tension":
-                meaning, alternative = "that of a bar in tension", "engineering"
+                meaning, alternative = "the strain of a bar in tension", "engineering"
             assumptions.append(
-                f'its strain is read as {meaning}; otherwise state strain = "{alternative}" or "tensor" in '
+                f'the strain is read as {meaning}; otherwise state strain = "{alternative}" or "tensor" in '
                 "[[specimens]]"
             )
         if self.amplitude_convention_unknown:
@@ -214,10 +214,10 @@ def campaigns_of_parts(
         of_parts.setdefault(inspection.part or "", []).append(inspection)
     if unknown := of_parts.pop("", []):
         raise CampaignError(
-            "the part of this test is not stated",
+            "the specimen number of this test is not stated",
             file=unknown[0].file,
-            found=f"parts {', '.join(of_parts)} in others",
-            expected="a number of the specimen in every file, or the tests of one part",
+            found=f"specimens {', '.join(of_parts)} in other files",
+            expected="a specimen number in every file, or files of a single part",
             hint="--specimen-number selects the tests of one part, and applies to files without such a column",
         )
     texts = {listed_in: f"# a campaign of each part: bushfit batch {listed_in}\n"}

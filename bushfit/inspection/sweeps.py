@@ -109,7 +109,7 @@ def copied_rows(sweep: Sweep, noise: SweepNoise, points: pd.DataFrame) -> Iterat
     if (count := int(copied.sum())) and pdtrc(count - 1, expected) < _CHANCE:
         row = int(np.argmax(rows.duplicated(keep=False)))
         yield (
-            f"{count} row{'s repeat others' if count > 1 else ' repeats another'} digit by digit, the first of them at "
+            f"{count} row{'s equal other rows' if count > 1 else ' equals another row'} in all digits, the first at "
             f"{sweep.frequency[row]:.4g} Hz (data row {row + 1}): copied instead of measured?"
         )
 
@@ -131,8 +131,8 @@ def odd_levels(sweep: Sweep, points: pd.DataFrame) -> Iterator[str]:
     if not steps.empty and steps.min() < _SMALLEST_STEP and round(of_frequency) != passes:
         yield (
             f"two amplitudes at {levels['frequency'][steps.idxmin()]:.4g} Hz differ by "
-            f"{number(100 * np.expm1(steps.min()), 2)} % and are treated as two levels; if they are repeats, number "
-            "them in a column repeat"
+            f"{number(100 * np.expm1(steps.min()), 2)} % and are treated as two levels; if the levels are repeats, "
+            "number the repeats in a column repeat"
         )
     relative_miss = np.abs(sweep.amplitude_reached / sweep.amplitude - 1.0)
     row = int(np.argmax(relative_miss))
@@ -158,7 +158,7 @@ def missing_frequencies(place: Place, points: pd.DataFrame) -> Iterator[str]:
         if absent:
             of_repeat = f", repeat {repeat}," if np.unique(points["repeat"]).size > 1 else ""
             listed = ", ".join(absent[:_MOST_LISTED] + ["..."] * (len(absent) > _MOST_LISTED))
-            yield f"{shown_amplitude(place, amplitude)}{of_repeat} lacks {listed} Hz, which most others have"
+            yield f"{shown_amplitude(place, amplitude)}{of_repeat} lacks {listed} Hz, which most other levels contain"
 
 
 def distance_from_curve(sweep: Sweep, points: pd.DataFrame) -> Array:

@@ -107,7 +107,7 @@ def classify(
     for column in (roles[role] for role in stated_units if role in roles):
         written = parse_unit(split_unit(column.header)[1] or table.layout.units[column.index])[0]
         if written != column.unit and units.is_compatible(written, column.unit or ""):
-            notes.append(f'"{column.header}" is read in {column.unit}, as stated, and not in {written}')
+            notes.append(f'"{column.header}" is read in the stated unit {column.unit}, not in {written} of the header')
     if {"force_amplitude", "stiffness"} & set(roles) and "amplitude" not in roles:
         notes += _add_motion_as_amplitude(table, roles, stated_units)
     time = roles.get("time")

@@ -147,7 +147,7 @@ def even_time(time: Floats) -> tuple[Floats, tuple[str, ...]]:
             longest = f"the longest gap is {steps.max():.3g} s from {time[steps.argmax()]:.6g} s"
             missing = rows[gaps].sum() - gaps.sum()
             reason = f"{missing} rows are missing, {longest}" if missing > 1 else f"1 row is missing, {longest}"
-        correction = (f"{reason}: resampled evenly at {1.0 / step:.6g} Hz, by straight lines",)
+        correction = (f"{reason}: resampled evenly at {1.0 / step:.6g} Hz by linear interpolation",)
     if even.size > _MOST_ROWS:
         raise MeasurementError("the history is too long", found=f"{even.size} rows", expected=f"up to {_MOST_ROWS}")
     return even, correction

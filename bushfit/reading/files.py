@@ -69,7 +69,7 @@ def view_bytes(
                 raise kind("this link leads to no file", file=file, found=f"a link to {file.readlink()}")
             siblings = [path.name for path in file.parent.iterdir()] if file.parent.is_dir() else []
             hint = did_you_mean(file.name, siblings) or "check the path for a typing error"
-            expected = "a path that a file states starts at the folder of this file"
+            expected = "a path in a file is relative to the folder of that file"
             raise kind("there is no such file", file=file, expected=f"an existing file; {expected}", hint=hint)
         if not file.is_file():
             found = "a folder" if file.is_dir() else "a device"
@@ -83,7 +83,7 @@ def view_bytes(
         raise kind("the file cannot be read", file=file, found=error.strerror or str(error)) from error
     if len(data) != size:
         found = f"{'more than' if len(data) > size else f'{len(data)} of'} {size} bytes"
-        hint = "wait until it is written, or copied, to its end"
+        hint = "wait until the file is written or copied completely"
         raise kind("the file changes while it is read", file=file, found=found, hint=hint)
     if data.isspace() or not data:
         raise kind("the file is empty", file=file, expected="text", hint="export it again")

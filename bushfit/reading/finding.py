@@ -74,7 +74,7 @@ def find_table(
         expected = f"{_EXPECTED_HEADER}, separated by comma, semicolon, tab, | or blanks"
         raise table.header_error("there is only one column", expected=expected)
     if table.layout.headerless and not any(text.isdecimal() for text in columns.values()):
-        hint = f"name the columns by their numbers in the campaign, and their units: {_NUMBERED_COLUMNS}"
+        hint = f"state the numbers of the columns and their units in the campaign: {_NUMBERED_COLUMNS}"
         raise table.header_error("there is no header", found=None, expected=_EXPECTED_HEADER, hint=hint)
     table = classify(table, vocabulary, columns, stated_units)
     essential = ({"displacement", "force"}, *map(set, PAIRS))

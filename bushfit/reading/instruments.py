@@ -30,8 +30,8 @@ from bushfit.reading.workbook import workbook
 _REAL = Vocabulary(
     {"time": LOOP_COLUMNS["time"], **{role: SWEEP_COLUMNS[role] for role in ("frequency", "amplitude")}}, {}
 )
-_MATLAB_HINT = 'save vectors, or structs of them, with -v7; a table by way of table2struct(T, "ToScalar", true)'
-_UFF_HINT = "export records or frequency responses as dataset 58; of data at nodes (55) only the latter are read"
+_MATLAB_HINT = 'save vectors, or structs of vectors, with -v7; convert a table with table2struct(T, "ToScalar", true)'
+_UFF_HINT = "export records or frequency responses as dataset 58; of dataset 55, only frequency responses are read"
 
 
 class Format(NamedTuple):
@@ -50,8 +50,8 @@ class Format(NamedTuple):
     endings: tuple[str, ...]
     sign: bytes
     read: Callable[[bytes, Path], Iterator[Group | Sheet]]
-    hint: str = "export it again, with its channels"
-    again: str = "it may be cut short: copy or export it again"
+    hint: str = "export the file again, with its channels"
+    again: str = "the file may be incomplete: copy or export it again"
 
 
 #: Supported formats of recordings.
@@ -87,9 +87,9 @@ def format_of(data: bytes, file: Path) -> Format | None:
         raise MeasurementError(
             f"this is not a {by_ending.name} file",
             file=file,
-            found="the first bytes of another file",
-            expected=f"a {by_ending.name} file, according to its ending {file.suffix}",
-            hint="export it again, or give it the right ending, such as .csv",
+            found="the first bytes of another format",
+            expected=f"a {by_ending.name} file, according to its extension {file.suffix}",
+            hint="export it again, or rename it with the correct extension, such as .csv",
         )
     return by_content
 
@@ -122,7 +122,7 @@ def read_parts(data: bytes, file: Path, recording: Format) -> tuple[Sheet, ...]:
             error.file = file
             raise
         except ImportError as error:
-            problem, details = "takes a package that is not installed", {"found": f"no package {error.name}"}
+            problem, details = "needs a package that is not installed", {"found": f"no package {error.name}"}
             details["hint"] = 'pip install "bushfit[instruments]"'
         except Exception as error:  # libraries raise any kind for broken files, struct.error and KeyError among them
             problem, details = "cannot be read", {"found": str(error) or type(error).__name__}
@@ -209,9 +209,9 @@ def _real_channels(channel: Channel, several: bool, is_record: bool) -> Iterator
     if values.dtype.kind == "c" and (is_record or _REAL.heading(channel.name)):
         raise MeasurementError(
             f'the channel "{channel.name}" holds complex numbers',
-            found=f"{values[np.argmax(values.imag != 0.0)]:.6g} among them",
+            found=f"{values[np.argmax(values.imag != 0.0)]:.6g}",
             expected="real numbers",
-            hint="export its real part, or leave the channel out",
+            hint="export the real part of the channel, or leave the channel out",
         )
     if values.dtype.kind == "c":
         yield channel._replace(values=np.abs(values))

@@ -163,12 +163,12 @@ def select_rows(table: Table, labels: Mapping[str, tuple[int, Sequence[str]]], w
     if several or (chosen and not selected):
         conflicts = [(column, parts, "one part")] if several else chosen
         raise table.header_error(
-            "this file contains tests of several parts" if several else "no row is of this test",
+            "this file contains tests of several parts" if several else "no row belongs to this test",
             found="; ".join(
                 f'{", ".join(dict.fromkeys(texts))} in column "{table.headers[index]}"' for index, texts, _ in conflicts
             ),
             expected=" and ".join(text for *_, text in conflicts),
-            hint='state one of them, as specimen_number = "..."; bushfit init lists all tests of a file',
+            hint='state one part: specimen_number = "..."; bushfit init lists all tests of a file',
         )
     if not chosen or len(selected) == total:
         return None
@@ -212,5 +212,5 @@ def note_not_understood(
             yield (
                 f'"{header}" (column {index + 1}) varies from row to row ({listed}) and is not understood: all '
                 f'rows are one test; rows = {{ "{header}" = "{values[0]}" }} in the campaign selects '
-                "those alone"
+                "only these rows"
             )

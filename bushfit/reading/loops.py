@@ -70,8 +70,8 @@ def read_loop(
         copies = np.flatnonzero(stuck) + 1
         if copies.size and all(np.array_equal(x[copies], x[copies - 1]) for x in values.values()):
             values = {role: np.delete(numbers, copies) for role, numbers in values.items()}
-            repeated = f"{copies.size} rows that repeat the rows" if copies.size > 1 else "1 row that repeats the row"
-            notes += (f"{repeated} before, with its time, left out",)
+            repeated = f"{copies.size} rows that equal the rows" if copies.size > 1 else "1 row that equals the row"
+            notes += (f"left out: {repeated} before, including the time",)
             displacement, force = values["displacement"], values["force"]
         time, more = increasing_time(table, wanted["time"], values["time"])
         notes = (*notes, *more)
@@ -185,13 +185,13 @@ def increasing_time(table: Table, column: Column, time: Floats) -> tuple[Floats,
     if stuck.any() and (even := spread(time)) is not None:
         rate = (time.size - 1) / (even[-1] - even[0])
         return even, (f'"{column.header}" is rounded and repeats: its rows are spread evenly, at {rate:.6g} Hz',)
-    hint = "if a column numbers the runs, bushfit init makes a loop of each"
+    hint = "if a column numbers the runs, bushfit init makes one loop of each run"
     if "block" in table.headers:
         hint = 'this file has several blocks: rows = { block = "1" } in the campaign selects the first; '
         hint += "bushfit init uses all"
     elif np.all(np.diff(time) >= 0.0):
         hint = "export the file again with more digits of the time"
-    table.refuse(np.append(False, stuck), column, "time does not increase", "a later time on every row", hint)
+    table.refuse(np.append(False, stuck), column, "time does not increase", "a later time in each row", hint)
     if time[-1] - time[0] < LEAST_VALUE:
-        raise table.error("the record takes no time", column=column, expected=f"{LEAST_VALUE:g} s or more")
+        raise table.error("the duration of the record is zero", column=column, expected=f"{LEAST_VALUE:g} s or more")
     return time, ()

@@ -47,11 +47,11 @@ def find_numerals(table: Table) -> Numerals:
     if evidence.is_contrary:
         problem, found = "this number has another format than the others", f'"{text}"'
         expected = f"numbers with a decimal {'comma' if usual.decimal == ',' else 'point'}"
-        hint = "correct this cell; or, if all numbers of the file are written so, state "
+        hint = "correct this cell; or, if all numbers of the file have this format, state "
         hint += 'decimal = "..." and thousands = "..." in the campaign'
     else:
         problem = "this number can be read in two ways"
-        found = f'"{text}", and no number in the file that settles it'
+        found = f'"{text}", and no other number in the file shows the decimal mark'
         expected = " or ".join(dict.fromkeys(f"{way.value(text) or 0.0:.15g}" for way in evidence.ways))
         hint = 'state decimal = "." or decimal = "," in the campaign'
     column = next(column for column in table.roles.values() if column.index == index)

@@ -16,7 +16,7 @@ from bushfit.reading.source import RowSource, Text
 _WEB_PAGES, _FIRST_BYTES = (b"<html", b"<!doctype html", b"<table"), 100
 #: Largest number of parts that an error lists; chosen: a line or two.
 _MOST_LISTED = 12
-_ONE_GROUP = "a test needs its channels in one group, at one rate and of one length: resample those that differ"
+_ONE_GROUP = "put all channels of a test into one group, and resample channels of another rate or length"
 
 
 @dataclass(frozen=True, eq=False)

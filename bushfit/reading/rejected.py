@@ -218,7 +218,7 @@ def refuse_other_columns(table: Table, left_out: Iterable[FaultyRow], vocabulary
                     line=line,
                     found=", ".join(filter(None, texts)),
                     expected=f"the columns of line {table.layout.header_line}: {', '.join(table.headers)}",
-                    hint="write all blocks with the same columns, or each to a file of its own",
+                    hint="write all blocks with the same columns, or each block to a separate file",
                 )
             if not (unit and column.unit) or unit == "-" or is_like_number(unit):
                 continue
@@ -236,5 +236,5 @@ def refuse_other_columns(table: Table, left_out: Iterable[FaultyRow], vocabulary
                 found=f"{', '.join(texts[column.index] for column in different)} on line {line}, "
                 f"{', '.join(str(column.unit) for column in different)} on line {first}",
                 expected="the same units in all blocks of a file",
-                hint="convert all blocks to the same units, or write each to a file of its own",
+                hint="convert all blocks to the same units, or write each block to a separate file",
             )

@@ -66,7 +66,7 @@ def read_resonance(table: Table, direction: Place, base_acceleration: float | No
     check_positive(table, wanted, values)
     ratio, base = _transmissibility(values, base_acceleration)
     bad = ~(np.isfinite(ratio) & (base > 0.0) & (ratio != 0.0))
-    table.refuse(bad, wanted["frequency"], "base or mass stands still here", "two accelerations that are not zero")
+    table.refuse(bad, wanted["frequency"], "base or mass does not move here", "two accelerations above zero")
     order = np.argsort(values["frequency"], kind="stable")
     source = Source(Path(table.file.name), table.opened.checksum.result())
     return ResonanceTest(table.file.stem, direction, values["frequency"][order], ratio[order], base[order], source)
@@ -93,7 +93,7 @@ def _resonance_columns(table: Table, place: Place, *, has_stated_base: bool) -> 
         )
     has_base = any(role.startswith("base") for role in columns) or "base_acceleration" in table.roles
     if has_base == has_stated_base:
-        problem, found, expected = "stated twice", "a column of the file, and --base-acceleration", "one of them"
+        problem, found, expected = "stated twice", "a column, and --base-acceleration", "one of them"
         hint = "leave --base-acceleration out"
         if not has_base:
             problem, found, expected = "not stated", ", ".join(table.headers), "a column such as base acceleration [g]"

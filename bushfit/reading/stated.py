@@ -74,7 +74,7 @@ def place_tested(test: Mapping[str, object], specimens: Sequence[Specimen]) -> P
     if bushing is not None or (bushings and specimen is None):
         if bushing not in bushings or specimen is not None:
             raise CampaignError(
-                "a test of no bushing of the campaign" if specimen is None else "a test of two bodies",
+                "the test names no bushing of the campaign" if specimen is None else "the test names two bodies",
                 found=" and ".join(str(name) for name in (bushing, specimen) if name is not None) or "no bushing",
                 expected="bushing = " + (" or ".join(f'"{name}"' for name in bushings) or "a name in [[bushings]]"),
             )
@@ -86,7 +86,7 @@ def place_tested(test: Mapping[str, object], specimens: Sequence[Specimen]) -> P
         expected = "direction = " + " or ".join(f'"{choice}"' for choice in Direction)
         hint = f'or specimen = "{next(iter(by_name))}"' if by_name else None
         found = "none" if direction is None else str(direction)
-        raise CampaignError("a test without a direction", found=found, expected=expected, hint=hint)
+        raise CampaignError("the direction of the test is not stated", found=found, expected=expected, hint=hint)
     if not isinstance(specimen, str) or specimen not in by_name:
         raise CampaignError(
             "this specimen is not in the campaign",
@@ -224,8 +224,8 @@ class LoopFile(TestFile):
         if is_incomplete or sum(map(bool, (self.sampling_rate, self.rate, self.frequency))) > 1:
             keys = [key for key in ("sampling_rate", "rate", "frequency", "waveform") if getattr(self, key)]
             expected = 'sampling_rate, or rate, or frequency and waveform ("sine" or "triangle") together'
-            hint = 'state waveform = "sine" beside it' if self.frequency and is_incomplete else None
-            problem = "these keys do not settle the time of a loop"
+            hint = 'state waveform = "sine" and frequency together' if self.frequency and is_incomplete else None
+            problem = "these keys do not determine the time of a loop"
             raise ValueError(CampaignError(problem, found=", ".join(keys), expected=expected, hint=hint))
 
     @property

@@ -213,8 +213,8 @@ def check_stiffness(
         column,
         "no bushing has this loss",
         f"a loss factor (loss over storage stiffness) from {low:g} to {high:g}",
-        f"check the unit: a phase in deg or rad, a loss factor in % or as a ratio [-]{other_unit}; or is it 90 deg "
-        "less the loss? Beyond the resonance of a moving mass, delete the rows from the file",
+        f"check the unit: a phase in deg or rad, a loss factor in % or as a ratio [-]{other_unit}; or is the "
+        "phase 90 deg minus the loss angle? Beyond the resonance of a moving mass, delete the rows from the file",
     )
     for redundant_pair in AGREEING_PAIRS:
         if redundant_pair == pair or not set(redundant_pair) <= set(values):
@@ -229,5 +229,5 @@ def check_stiffness(
             table.roles[redundant_pair[1] if redundant_pair[0] == pair[0] else redundant_pair[0]],
             "the columns contradict each other",
             f"the complex stiffness of {used}, within {100 * _AGREEMENT:g} %, in {redundant_headers}",
-            "correct the columns that are wrong, or take them out",
+            "correct the wrong columns, or remove them",
         )

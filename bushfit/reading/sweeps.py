@@ -89,10 +89,10 @@ def read_sweep(
             table.refuse(
                 np.abs(values[role] - value) > _STATED_AGREEMENT * value,
                 columns[role],
-                f"the {role} is not the one that is stated",
+                f"the {role} in the file differs from the stated {role}",
                 f"at_{role} as the campaign states it, {value / columns[role].scale:.6g} {columns[role].unit}, "
                 f"within {100 * _STATED_AGREEMENT:g} %",
-                f"take at_{role} out of the campaign: the file has a column for it",
+                f"remove at_{role} from the campaign: the file has a column for the {role}",
             )
         values.setdefault(role, np.full(values[pair[0]].size, value))
     values, corrections = with_positive_loss(values, columns, test)
@@ -217,7 +217,7 @@ def _rows_at_temperature(
         rows = np.flatnonzero(np.abs(kelvin - temperature) <= SAME_TEMPERATURE)
         if rows.size >= _FEWEST_SWEEP_ROWS:
             return rows, temperature, kelvin[rows]
-        problem = "too few rows are near the temperature that is stated"
+        problem = "too few rows are near the stated temperature"
         degrees = f"{temperature - si.CELSIUS:.4g} degC"
         expected = f"{_FEWEST_SWEEP_ROWS} rows or more within {SAME_TEMPERATURE:g} K of {degrees}"
     ordered = np.sort(kelvin) - si.CELSIUS

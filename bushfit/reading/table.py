@@ -263,7 +263,7 @@ class Table:
             f'{count} rows are marked "{cell[:_LONGEST_QUOTE]}"' for cell, count in texts.items() if is_remark(cell)
         ]
         if hidden := [number for number in self.source.hidden if number > self.layout.header_line]:
-            sentences.append(f"{len(hidden)} rows from row {hidden[0]} on are hidden in the workbook, and are read too")
+            sentences.append(f"{len(hidden)} rows from row {hidden[0]} on are hidden in the workbook, but are read")
         return tuple(sentences)
 
     @cached_property
@@ -282,8 +282,7 @@ class Table:
     @property
     def note_sampling(self) -> str:
         """Note for the user that the time comes from the sampling rate above the table."""
-        rate = f"{self.sampling_rate:.6g} a second"
-        return f"the file has no time: its rows are {rate}, as the lines above the table state"
+        return f"no time column: the rows are {self.sampling_rate:.6g} a second, as the lines above the table state"
 
     def agrees(self, role: str, expected: str) -> bool:
         """True if there is a column for a role such as "force", whose unit has the dimension of the unit `expected`."""

@@ -133,7 +133,7 @@ def unpivot(source: RowSource, layout: Layout, file: Path, vocabulary: Vocabular
         return None
     sheet, long_layout = _long_table(columns, source, file, vocabulary)
     summaries = dict.fromkeys(text for text in texts if is_summary_row([text]))
-    notes = tuple(f'the column "{text}" is left out, as a summary of others' for text in summaries)
+    notes = tuple(f'the column "{text}" is left out, because it summarizes other columns' for text in summaries)
     written = tuple(text for text in texts if any(m.role or m.stepped for m in _read_corner(text, vocabulary)))
     return sheet, replace(long_layout, delimiter=mark, written=written, notes=notes)
 
@@ -265,7 +265,7 @@ def _long_table(
         problem, expected = "the blocks of this wide table differ", "the same frequencies and amplitudes in all blocks"
     elif len(down) > 1 or len(across) > 1 or len(quantities) > len(by_role):
         problem = "this wide table states one quantity in two ways"
-        expected = "one unit for each quantity, and levels of one kind"
+        expected = "one unit for each quantity, and levels of the same kind"
     if problem:
         kinds = Counter((one.role, one.unit, one.stepped, len(points)) for one, _, points in columns)
         found = (
@@ -274,7 +274,7 @@ def _long_table(
             for (role, unit, stepped, rows), count in kinds.items()
         )
         place = f'sheet "{source.sheet}"' if source.sheet else f"line {columns[0].points[0][0] - 1}"
-        hint = "correct the wide table, or write it as a long one: a row for each frequency and amplitude"
+        hint = "correct the wide table, or write a long table with one row for each frequency and amplitude"
         raise MeasurementError(problem, file=file, place=place, found="; ".join(found), expected=expected, hint=hint)
     headers = tuple(
         f"{vocabulary.name_of(role or '')}{COUNTED[convention]}{f' [{unit}]' if unit else ''}"

@@ -102,7 +102,7 @@ def _moving_channels(channels: Sequence[DisplacementHistory]) -> list[Displaceme
     no_motion, shapes = "this is not a motion", {channel.displacement.shape for channel in channels}
     if len(shapes) != 1 or len(shape := shapes.pop()) != 1 or shape[0] < FEWEST_ROWS:
         found = ", ".join(f"{channel.direction}: {channel.displacement.shape}" for channel in channels)
-        expected = f"at least {FEWEST_ROWS} displacements, as many in each direction"
+        expected = f"at least {FEWEST_ROWS} displacements, the same number in each direction"
         raise MeasurementError("this is not a history", found=found or "no direction", expected=expected)
     for channel in channels:
         if not np.all(np.abs(channel.displacement) < _LARGEST):
@@ -110,7 +110,7 @@ def _moving_channels(channels: Sequence[DisplacementHistory]) -> list[Displaceme
     still = [channel.direction for channel in channels if not np.ptp(channel.displacement)]
     if len(still) == len(channels):
         raise MeasurementError(no_motion, place=", ".join(map(str, still)), expected="displacements that change")
-    notes = tuple(f"{place}: left out, its displacement never changes" for place in still)
+    notes = tuple(f"{place}: left out, because the displacement is constant" for place in still)
     return [replace(channel, notes=(*channel.notes, *notes)) for channel in channels if channel.direction not in still]
 
 
@@ -138,7 +138,7 @@ def _require_cycle(channel: DisplacementHistory) -> None:
             place=str(channel.direction),
             found=f"{first} at the start, {last} at the end",
             expected="a history that ends where it begins",
-            hint="cut it to whole cycles, or leave --steady out",
+            hint="cut the history to whole cycles, or leave --steady out",
         )
 
 

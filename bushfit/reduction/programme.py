@@ -146,7 +146,7 @@ def steady_spans(loop: Loop, time: Floats, motion: Floats) -> list[SteadySpan]:
             file=loop.source.file if loop.source else loop.name,
             found=f"{inner.size / 2.0:.2g} cycles from {low:.3g} to {high:.3g} {unit}, no two successive ones equal",
             expected="at least two cycles of one amplitude and rate",
-            hint="record more cycles of each amplitude, best five; a road load belongs in respond or [[validation]]",
+            hint="record five cycles of each amplitude; for a road load, use bushfit respond or [[validation]]",
         )
     if not spans:
         return []
@@ -243,7 +243,7 @@ def omitted_rows_sentence(gaps: Iterable[str], cycles: float) -> str:
         gaps: durations before and after the steady cycles, formatted with a unit; "" for no gap.
         cycles: number of cycles used.
     """
-    parts = [f"{gap} {side} its steady cycles" for gap, side in zip(gaps, ("before", "after"), strict=True) if gap]
+    parts = [f"{gap} {side} the steady cycles" for gap, side in zip(gaps, ("before", "after"), strict=True) if gap]
     return f"{' and '.join(parts)} are left out; {cycles:.3g} cycles are used"
 
 

@@ -79,8 +79,8 @@ class Resonance:
         if omitted.size:
             sentences.append(
                 f"{omitted.size} of {total} points left out, {omitted.min():.4g} to {omitted.max():.4g} Hz: the "
-                f"standard error of K exceeds {100 * LARGEST_ERROR:g} % there, because the mass moves almost as "
-                "the base does"
+                f"standard error of K exceeds {100 * LARGEST_ERROR:g} % there, because mass and base "
+                "move almost equally"
             )
         if self.turned:
             sentences.append(
@@ -191,7 +191,7 @@ def reduce_resonance(test: ResonanceTest, mass: float) -> Resonance:
             file=test.source.file,
             found=f"{100 * error.min():.3g} % at best",
             expected=f"a standard error of K of at most {100 * LARGEST_ERROR:g} % somewhere",
-            hint="sweep through the resonance, or look at the accelerations: they scatter",
+            hint="sweep through the resonance, or check the accelerations, which scatter",
         )
     points = frequency[is_kept], amplitude[is_kept], stiffness[is_kept], error[is_kept], rows[is_kept]
     return Resonance(test, mass, turned, *points, left_out=frequency[~is_kept])
@@ -215,12 +215,12 @@ def counts_phases_backwards(test: ResonanceTest) -> bool:
     loss = -float(np.sum(weight * np.sin(np.angle(flexibility))))
     if max(share, 1.0 - share) < _CLEAR_SHARE or abs(loss) < LEAST_LOSS_FACTOR:
         raise MeasurementError(
-            "the phases show no loss with either sign",
+            "the phases show no positive loss with either sign",
             file=test.source.file,
             found=f"a mean loss factor of {loss:.2g}, above zero in {100 * share:.0f} % of the points that the "
             "test determines",
             expected="a mass that lags behind the base through the whole resonance",
-            hint="check the unit of the phases, deg or rad, and that they are those of base and mass",
+            hint="check that the unit of the phases (deg or rad) is right, and that the phases belong to base and mass",
         )
     positive = float(np.sum(weight[flexibility.real > 0.0]))
     if positive < _CLEAR_SHARE:

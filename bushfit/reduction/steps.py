@@ -38,7 +38,7 @@ _LEVEL_GAP = 0.1
 #: Largest relative distance of a step from its stated level; chosen: rigs miss a level by less.
 _LEVEL_REACH = 0.3
 #: Reason why a stretch whose frequency or amplitude is not steady gives no point.
-_CHANGING = "its frequency or amplitude keeps changing"
+_CHANGING = "the frequency or amplitude changes all the time"
 
 
 def reduce(histories: Sequence[Loop], *, fewest_cycles: int = 3, levels: Sequence[float] = ()) -> Reduction:
@@ -67,9 +67,9 @@ def reduce(histories: Sequence[Loop], *, fewest_cycles: int = 3, levels: Sequenc
             "no steady sine was found",
             file=histories[0].source.file if histories[0].source else histories[0].name,
             found="; ".join(f"{skip.start:.4g} to {skip.end:.4g} s: {skip.why}" for skip in skipped[:3])
-            or "a displacement that does not go up and down",
+            or "a displacement that does not oscillate",
             expected=f"a stepped sine with at least {fewest_cycles} whole cycles at one frequency and amplitude",
-            hint="a slow loop needs no reduction: name it under [[loops]]",
+            hint="a slow loop needs no reduction: list the file under [[loops]]",
         )
     direction = histories[0].direction
     return Reduction(direction, tuple(group_steps(steps, levels, direction)), tuple(skipped), outliers)
@@ -239,7 +239,7 @@ def group_steps(steps: Sequence[Step], levels: Sequence[float], direction: Place
         if far.size:
             step, listed = steps[far[0]], " or ".join(f"{factor * value:.4g} {unit}" for value in levels)
             raise MeasurementError(
-                "a step is at none of the levels",
+                "the amplitude of a step is none of the stated levels",
                 place=f"{step.name}, {step.start:.4g} to {step.end:.4g} s",
                 found=f"{factor * step.amplitude:.4g} {unit} at {step.frequency:.4g} Hz",
                 expected=f"within {100 * _LEVEL_REACH:g} % of {listed}",

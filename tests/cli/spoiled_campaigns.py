@@ -14,7 +14,7 @@ IN_CAMPAIGN = [
     ('"10 mm"', '"nan mm"', "campaign.toml, bushing.inner_radius: this is not a quantity", 'a length with its unit, such as "10 mm"'),
     ('"10 mm"', '"1e999 mm"', "campaign.toml, bushing.inner_radius: the number is too large", 'a length with its unit, such as "10 mm"'),
     ('"10 mm"', '"10,5 mm"', "campaign.toml, bushing.inner_radius: this is not a quantity", 'write "10.5 mm", with a decimal point'),
-    ('"10 mm"', '"18 mm"', "campaign.toml, inner_radius, outer_radius: impossible bushing", "found: 18 mm and 18 mm", "check that radii were given, not diameters, and that they are not swapped"),
+    ('"10 mm"', '"18 mm"', "campaign.toml, inner_radius, outer_radius: impossible bushing", "found: 18 mm and 18 mm", "check that the values are radii, not diameters, and that inner and outer are not swapped"),
     ('inner_radius = "10 mm"', 'inner_radius = "10 mm"\ninner_diameter = "20 mm"', "campaign.toml, bushing.inner_radius: the inner size of the rubber is stated twice", "inner_radius or inner_diameter"),
     ('outer_radius = "18 mm"', "", "campaign.toml, bushing.outer_radius: the outer size of the rubber is missing", "outer_radius or outer_diameter"),
     ('"34 mm"', "34 mm", "campaign.toml, line 5, column 13: this is not valid TOML", "put texts and quantities in quotes"),
@@ -22,7 +22,7 @@ IN_CAMPAIGN = [
     ('length = "34 mm"', 'length = "34 mm"\ncolour = "black"', "campaign.toml, bushing.colour: unknown key", "one of name, length, inner_radius, outer_radius"),
     *(('length = "34 mm"', f'length = "34 mm"\n[compound]\nhardness = {text}\nfiller = "27 phr"', "campaign.toml, compound.hardness", said) for text, said in (('"61"', "61 Shore A"), ('"61 Shore D"', "61 Shore A"), ('"-61 Shore A"', "61 Shore A"), ("61", "61 Shore A"), ('"95 Shore A"', "95 Shore A"))),
     *(('length = "34 mm"', f'length = "34 mm"\n[compound]\nhardness = "61 Shore A"\nfiller = {text}', "campaign.toml, compound.filler", said) for text, said in (('"27"', "27 phr"), ('"27 %"', "27 phr"), ('"27 phr silica"', "27 phr"), ("true", "27 phr"), ('"500 phr"', "500 phr"))),
-    ('length = "34 mm"', 'length = "1 mm"\nshape = "calibrated"', "campaign.toml, shape: no finite elements were computed for this shape", "inner/outer 0.15 to 0.92 and length/outer 0.1 to 60"),
+    ('length = "34 mm"', 'length = "1 mm"\nshape = "calibrated"', "campaign.toml, shape: the calibrated formulas do not cover this shape", "inner/outer 0.15 to 0.92 and length/outer 0.1 to 60"),
     ('"loop.csv"', r'"C:\Tests.csv"', "campaign.toml, line 8, column", "write / for each \\ of a path"),
     ("[[sweeps]]", "[[loops]]\nfile = 'x'\n[loops]", "campaign.toml, line 13, column", "list several tests under [[loops]]"),
     ("[[loops]]", "[loops]", "campaign.toml, loops: this value is not understood", "write [[loops]], in two brackets"),
@@ -31,7 +31,7 @@ IN_CAMPAIGN = [
     ('"loop.csv"', '"sweep.csv"', "sweep.csv, line 1: there is no column for the displacement", 'name the column in the campaign: columns = { displacement = "..." }'),
     ('"loop.csv"', '"campaign.toml"', "campaign.toml, line 1: there is only one column", 'a header row such as "time [s],displacement [mm],force [N]", separated by comma,'),
     ('"loop.csv"', '"loop.csv"\nrate = "10 mm"', "campaign.toml, loops #1.rate: the unit does not fit", "a speed, such as mm/min"),
-    ('"loop.csv"', '"loop.csv"\nrate = "10 mm/min"\nfrequency = "0.1 Hz"\nwaveform = "sine"', "campaign.toml, loops #1: these keys do not settle the time of a loop", 'rate, or frequency and waveform ("sine" or "triangle") together'),
+    ('"loop.csv"', '"loop.csv"\nrate = "10 mm/min"\nfrequency = "0.1 Hz"\nwaveform = "sine"', "campaign.toml, loops #1: these keys do not determine the time of a loop", 'rate, or frequency and waveform ("sine" or "triangle") together'),
     ('"loop.csv"', '"loop.csv"\nnoise = "200 %"', "campaign.toml, loops #1.noise: this value is not understood", "less than 1"),
     ('"loop.csv"', '"loop.csv"\ncolumns = {force = "Kraft" }', 'loop.csv, line 1: there is no column "Kraft"', "the header that was stated for the force"),
     ('"loop.csv"', '"loop.csv"\ncolumns = {force = "forse" }', 'loop.csv, line 1: there is no column "forse"', 'did you mean "force [N]"?'),
@@ -72,7 +72,7 @@ IN_MORE = [
     ('specimen = "DMA"', 'specimen = "DMA"\ndirection = "axial"', "more.toml, simulate.sweeps #2: a specimen has no such direction", 'direction = "shear", or none'),
     ('specimen = "DMA"\n', "", "more.toml, simulate.sweeps #2: a test without a direction", 'or specimen = "DMA"'),
     ('direction = "radial"', 'direction = "torsion"', "more.toml, simulate.resonances #1: this cannot carry a mass", "a direction with a displacement, or a specimen in shear"),
-    ('"500 Hz"', '"60 Hz"', "more.toml, simulate.resonances #1: no frequencies of a shaker", "at least 12, through the resonance"),
+    ('"500 Hz"', '"60 Hz"', "more.toml, simulate.resonances #1: no frequencies of a shaker", "at least 12, from below to above the resonance"),
 ]
 #: (name, content of the campaign, what the error says ...)
 WHOLE_CAMPAIGNS = [

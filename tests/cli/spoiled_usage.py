@@ -100,7 +100,7 @@ USAGE = [
     ("init|loop.csv|--length|34 mm|--inner-radius|10 mm|--inner-diameter|20 mm", "'--inner-radius' and '--inner-diameter' state the same size; give one of them."),
     ("init|loop.csv|--inner-radius|10 mm|--outer-radius|18 mm|--length|34 mm", "loop.csv: the direction of this test is not stated", "state it: --direction axial (or radial, torsion)"),
     ("init|loop.csv|--direction|axial|--inner-radius|10|--outer-radius|18 mm|--length|34 mm", "--inner-radius: a number without a unit", 'write "10 mm"'),
-    ("init|loop.csv|--direction|axial|--inner-radius|20 mm|--outer-radius|18 mm|--length|34 mm", "--inner-radius, --outer-radius: impossible bushing", "check that radii were given, not diameters, and that they are not swapped"),
+    ("init|loop.csv|--direction|axial|--inner-radius|20 mm|--outer-radius|18 mm|--length|34 mm", "--inner-radius, --outer-radius: impossible bushing", "check that the values are radii, not diameters, and that inner and outer are not swapped"),
     ("init|loop.csv|--direction|axial|--inner-diameter|40 mm|--outer-diameter|36 mm|--length|34 mm", "--inner-diameter, --outer-diameter: impossible bushing", "a diameter is halved; check that inner and outer are not swapped"),
     ("reduce|sweep.csv", "sweep.csv, line 1: this is a sweep already", "name it in the campaign under [[sweeps]]"),
     ("reduce|shaker.csv|--direction|axial", "shaker.csv, line 1: this is a resonance test, and its mass is not stated", 'state it: --mass "0.5 kg"'),

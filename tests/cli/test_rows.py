@@ -62,7 +62,7 @@ def test_directions_are_tests_of_their_own(typed, points, tmp_path, language, en
     for sweep in sweeps:
         assert np.abs(sweep.stiffness) == pytest.approx([1e3 * row[2] for row in points[str(sweep.direction)]])
     one = typed("init", f"both.{ending}", *GEOMETRY, "-o", "y", "--direction", "axial")
-    assert "its rows of radial, as stated" in one.stderr
+    assert "rows of radial are not used: other values were stated" in one.stderr
     assert [str(sweep.direction) for sweep in load_campaign(tmp_path / "y/campaign.toml").sweeps] == ["axial"]
 
 
@@ -114,9 +114,9 @@ def test_what_is_not_understood_is_named(typed, points, tmp_path):
 @pytest.mark.parametrize(
     ("entries", "said"),
     [
-        ('direction = "torsion"', ["no row is of this test", 'axial, radial in column "Direction"', "torsion"]),
+        ('direction = "torsion"', ["no row belongs to this test", 'axial, radial in column "Direction"', "torsion"]),
         ('direction = "axial"\nrows = { Dir = "axial" }', ['there is no column "Dir"', "Direction, Frequency [Hz]"]),
-        ('direction = "axial"\nrows = { Direction = "up" }', ["no row is of this test", "up"]),
+        ('direction = "axial"\nrows = { Direction = "up" }', ["no row belongs to this test", "up"]),
         ('direction = "axial"\n[[sweeps]]\nfile = "both.csv"\ndirection = "axial"', ["a file is listed twice"]),
     ],
 )

@@ -188,7 +188,7 @@ def written(root: Path, folder: Path, name: str, tables: str) -> Path:
     ("name", "tie", "problem"),
     [
         ("cmp_15961_prior", '[fit.m]\nequal = "0.18 * mu"', 'try: expression = "..." takes the value of an expression'),
-        ("cmp_15961_prior", '[fit.m]\nequal = "mu"', "parameters of different units are not equal"),
+        ("cmp_15961_prior", '[fit.m]\nequal = "mu"', "parameters of different units cannot be equal"),
         ("cmp_15961_prior", '[fit.alpha]\nexpression = "mu"', "impossible value\n  found: mu = 1."),
         ("cmp_15961_prior", '[fit.m]\nexpression = "log(alpha - 1)"', "this expression has no value"),
         ("three_shapes", f'[{LONG}]\nequal = "stiffness_factor.y z"', "no such direction or specimen"),

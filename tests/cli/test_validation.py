@@ -133,8 +133,8 @@ def test_a_low_pass_and_corrections_of_a_record_are_stated(campaign, bushfit, tm
 @pytest.mark.parametrize(
     ("old", "new", "problem"),
     [
-        ('rms = "0.05 mm", ', "", "these keys do not state a motion"),
-        ('["2 Hz", "60 Hz"]', '["60 Hz", "2 Hz"]', "these frequencies are no band"),
+        ('rms = "0.05 mm", ', "", "these keys do not describe a motion"),
+        ('["2 Hz", "60 Hz"]', '["60 Hz", "2 Hz"]', "these frequencies are not a band"),
         ('duration = "3 s"', 'duration = "3000 s"', "too long to simulate"),
     ],
 )

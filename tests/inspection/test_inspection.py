@@ -172,8 +172,8 @@ def copied(sweep: Sweep) -> Sweep:
 
 
 SWEEP_FAULTS: dict[str, Callable[[Sweep], Sweep]] = {
-    "16 rows repeat others digit by digit, the first of them at 5 Hz (data row 1)": copied,
-    "0.2 mm, repeat 1, lacks 45, 55 Hz, which most others have": lambda x: lacking(
+    "16 rows equal other rows in all digits, the first at 5 Hz (data row 1)": copied,
+    "0.2 mm, repeat 1, lacks 45, 55 Hz, which most other levels contain": lambda x: lacking(
         x, (x.amplitude == 2e-4) & np.isin(x.frequency, (45.0, 55.0))
     ),
     "data row 21 (45 Hz, 0.1 mm, repeat 2) deviates by +1": lambda x: spoiled(x, np.arange(x.repeat.size) == 20, 1.15),
@@ -264,7 +264,7 @@ def test_moduli_are_those_of_a_specimen(header, cells, name, strain, tmp_path):
     seen = inspect_file(tmp_path / f"{name}.csv", {"specimen": "DMA"})
     assert seen.direction == Specimen("DMA", "modulus", strain=strain)
     assert seen.entry == {"specimen": "DMA"} | ({"at_amplitude": "0.1 %"} if "%" in name else {})
-    assert "its strain is read as" in seen.assumed
+    assert "the strain is read as" in seen.assumed
     assert inspect_file(tmp_path / f"{name}.csv", {}).direction.name == ("bar" if strain == "tension" else "coupon")
 
 

@@ -198,7 +198,7 @@ INSTRUMENT_EXPORTS: dict[str, Export] = {
     ),
     # a wrong unit in a header, numbers in volts or digits, marks for missing values
     "a wrong unit in a header": Export(
-        sweep("Frequency [Hz]|Amplitude [mm]|K* [kN/mm]|Phase (rad)", F, A, K, PHASE), words=["is read in N/mm, as stated, and not in kN/mm"],
+        sweep("Frequency [Hz]|Amplitude [mm]|K* [kN/mm]|Phase (rad)", F, A, K, PHASE), words=["is read in the stated unit N/mm, not in kN/mm of the header"],
         stated={"units": {"stiffness": "N/mm", "phase": "deg"}},
     ),
     "a phase whose unit cannot be": Export(sweep("Frequency [Hz]|Amplitude [mm]|K* [kN/mm]|Phase (rad)", F, A, K, PHASE), None, ['--unit "phase=deg"']),
