@@ -214,6 +214,6 @@ def _check_alive(executor: Executor) -> None:
         raise BatchError(
             "no worker process starts",
             found=str(error) or type(error).__name__,
-            expected="processes that import the same packages as this one",
-            hint="read the messages of the processes above, and install bushfit and its packages again",
+            expected="worker processes that import the same packages as this process",
+            hint="read the messages above, and install bushfit and its packages again",
         ) from error

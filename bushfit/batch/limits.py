@@ -96,7 +96,7 @@ _RATIO = converter(
 Ratio = Annotated[float, _RATIO, _LIMIT]
 _STIFFNESS = converter(
     lambda raw, info: parse_quantity(raw, point.motion.stiffness_unit) if (point := info.data.get("at")) else 0.0,
-    text("a number with a unit of N/m, N*m/rad or Pa, by the point"),
+    text("a number with a unit of N/m, N*m/rad or Pa, depending on the point"),
 )
 Stiffness = Annotated[float, _STIFFNESS, _LIMIT]
 
@@ -219,7 +219,7 @@ def resolve_limits(limits: Limits, values: Mapping[str, Array]) -> tuple[dict[st
         sample = sample[np.isfinite(sample)]
         median, deviation = median_and_scatter(sample) if sample.size else (0.0, 0.0)
         if sample.size < bounds.at_least:
-            notes.append(f"{name}: {sample.size} parts, and at_least = {bounds.at_least}: sigma is not judged")
+            notes.append(f"{name}: {sample.size} parts, fewer than at_least = {bounds.at_least}: sigma is not judged")
         elif deviation == 0.0:
             notes.append(f"{name}: more than half of the parts have exactly the same value: sigma is not judged")
         else:

@@ -213,7 +213,7 @@ def estimate_quantities(result: Result, points: Sequence[Point]) -> tuple[dict[s
         place = places[0]
         if len(places) > 1:
             expected = " or ".join(f'"{name} ..."' for name in places)
-            raise BatchError("this operating point is of several places", found=str(point), expected=expected)
+            raise BatchError("several places fit this operating point", found=str(point), expected=expected)
         if place.motion != point.motion:
             problem = "the unit of this amplitude does not suit this direction or specimen"
             expected = f"an amplitude in {place.display.displacement.name}"

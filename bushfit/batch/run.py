@@ -46,7 +46,7 @@ def check_output(plan: BatchPlan, *, force: bool) -> None:
         report, folder = plan.junit.resolve(), output.resolve()
         try:
             if report in [folder / name for name in FILES] or folder / store.ROWS_FOLDER in (report, *report.parents):
-                raise OutputError("the report cannot be inside the results of the rows or replace the table")
+                raise OutputError("the report cannot be in the results folder of a bushing or replace the table")
             check_free(plan.junit.parent, [plan.junit.name], overwrite=replaces)
         except OutputError as error:
             error.file, error.place = plan.junit, "--junit"

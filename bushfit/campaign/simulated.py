@@ -145,11 +145,11 @@ class SimulatedResonance(SimulatedTest):
     def __post_init__(self) -> None:
         if self.direction.motion is not TRANSLATION:
             expected = "a direction with a displacement, or a specimen in shear"
-            raise ValueError(CampaignError("this cannot carry a mass", found=str(self.direction), expected=expected))
+            raise ValueError(CampaignError("a mass needs a translation", found=str(self.direction), expected=expected))
         usable = [f for f in self.frequencies if 1.0 / LARGEST_SHAKEN <= f <= LARGEST_SHAKEN]
         if len(usable) < max(FEWEST_ROWS, len(self.frequencies)):
             expected = f"at least {FEWEST_ROWS}, from below to above the resonance"
-            raise ValueError(CampaignError("too few shaker frequencies", found=f"{len(usable)}", expected=expected))
+            raise ValueError(CampaignError("too few frequencies", found=f"{len(usable)}", expected=expected))
 
 
 @dataclass(frozen=True)
@@ -179,7 +179,7 @@ class SimulatedRecord(SimulatedTest):
             expected = "an amplitude for each frequency of sines and random, and rms for random and road"
             raise ValueError(CampaignError("these keys do not describe a motion", found=found, expected=expected))
         if min(np.diff(self.frequencies), default=self.motion == "sines") <= 0.0:
-            raise ValueError(CampaignError("these frequencies are not a band", expected="two or more, ascending"))
+            raise ValueError(CampaignError("this is not a frequency band", expected="two or more, ascending"))
 
 
 @dataclass(frozen=True)

@@ -142,7 +142,7 @@ def _print_gap(output: Output, document: Mapping[str, Any], changed: bool) -> No
     )
     output.print_table(title, ("", "before", "after"), rows)
     if usable:
-        how = "of the points, each left out of the fit" if usable["held_out"] else "of the fitted points"
+        how = "of the points, each left out of the fit in turn" if usable["held_out"] else "of the fitted points"
         error = f"{number(100 * usable['stiffness'], 2)} % in stiffness and {number(usable['loss_factor'], 2)}"
         console.print(f"  expected error {error} in loss factor (95 % {how})")
     if output.verbose:
@@ -165,6 +165,6 @@ def _print_effect(output: Output, effect: EffectEntry) -> None:
         if effect["alternatives"]:
             console.print(f"    the tests cannot distinguish {names}")
         else:
-            console.print(f"    the tests determine its size but cannot distinguish {names}")
+            console.print(f"    the tests determine the size of the effect but cannot distinguish {names}")
     if effect["correction"]:
         console.print(f"    correction in the campaign: {escape(effect['correction'])}")

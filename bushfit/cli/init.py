@@ -216,7 +216,7 @@ def inspect_sources(
                 "this is a raw stepped-sine history, not a sweep",
                 file=inspection.file,
                 expected="hysteresis loops and sweeps",
-                hint=f"{hint}; give that file instead",
+                hint=f"{hint}; give sweep.csv instead",
             )
         sentences.append(f"{source}: a raw stepped-sine history; {hint}")
     return inspections, sentences

@@ -48,7 +48,7 @@ _DISPLAYED = ("displacement", "stiffness")
     option("--mass MASS", 'Mass that the mount carries on the shaker, such as "0.5 kg".', type=quantity("kg")),
     option(
         "--mass-added MASS",
-        'Further mass that moves with it, such as "15 g" of accelerometer and cable; added to --mass.',
+        'Further mass that moves with this mass, such as "15 g" of accelerometer and cable; added to --mass.',
         type=quantity("kg"),
     ),
     option("--specimen NAME", "Name of the tested specimen, if the test is not of a bushing."),
@@ -151,11 +151,11 @@ def _reduce_resonance(
 
     if len(files) > 1 or levels is not None:
         raise MeasurementError(
-            "a resonance test is reduced by itself",
+            "several files or levels cannot be reduced for a resonance test",
             file=table.file,
             found=f"{len(files)} files" if len(files) > 1 else f"--levels {levels}",
-            expected="one file, and no levels: the amplitude follows the resonance",
-            hint="call bushfit reduce for each of them, with its own mass",
+            expected="one file without --levels, because the amplitude follows the resonance",
+            hint="call bushfit reduce for each file, with the mass of that test",
         )
     direction, specimen = test_direction(table.file, table, test_options), shaker["specimen"] or None
     if direction is None and specimen is None:
@@ -164,11 +164,11 @@ def _reduce_resonance(
         raise error
     if direction is not None and direction.is_rotation:
         raise MeasurementError(
-            "a mass resists no rotation", file=table.file, found=str(direction), expected="a translation"
+            "a mass needs a translation", file=table.file, found=str(direction), expected="a translation"
         )
     if (mass := shaker["mass"]) is None:
         raise MeasurementError(
-            "this is a resonance test, and its mass is not stated",
+            "the mass of this resonance test is not stated",
             file=table.file,
             place=f"line {table.layout.header_line}",
             found=", ".join(table.headers),
@@ -197,10 +197,10 @@ def _read(files: Sequence[Path], test_options: Mapping[str, Any]) -> list[Loop]:
             raise direction_error(file)
         if histories and direction is not histories[0].direction:
             raise MeasurementError(
-                "the files are of several directions",
+                "the files contain several directions",
                 found=f"{files[0]} ({histories[0].direction}), {file} ({direction})",
                 expected="histories of one direction",
-                hint="reduce each direction by itself",
+                hint="call bushfit reduce for each direction separately",
             )
         histories.append(replace(history, direction=direction, name=stem if stems.count(stem) == 1 else str(file)))
     return histories

@@ -187,7 +187,7 @@ def grid(unit: str) -> Callable[[str], Grid]:
         parts = re.fullmatch(r"\s*([-+0-9.eE,:\s]*[0-9.])\s*([^-+\d\s:,.][^,]*)", text)
         is_span = re.search(r"^[^:]*(:|[0-9.]\s*-)[^:]*$", text)  # "5:155 Hz" or "5-155 Hz"
         if not parts or parts[1].count(":") not in (0, 2) or is_span:
-            hint = "write the step, too: start:stop:step" if is_span else None
+            hint = "add the step: start:stop:step" if is_span else None
             raise UnitError("these are not values with a unit", found=repr(text), expected=expected, hint=hint)
         is_range = ":" in parts[1]
         numbers = [parse_quantity(f"{number} {parts[2]}", unit) for number in parts[1].split(":" if is_range else ",")]
@@ -195,9 +195,9 @@ def grid(unit: str) -> Callable[[str], Grid]:
         values = Grid(regular_steps(*numbers) if is_range else numbers)
         values.text = text
         if not values:
-            raise UnitError("start:stop:step does not count upward", found=text, expected=expected, hint=hint)
+            raise UnitError("start:stop:step contains no value", found=text, expected=expected, hint=hint)
         if min(values) <= 0.0:
-            raise UnitError("frequencies and amplitudes are above zero", found=text, expected=expected, hint=hint)
+            raise UnitError("a frequency or amplitude is zero or negative", found=text, expected=expected, hint=hint)
         return values
 
     return parse

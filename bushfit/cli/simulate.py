@@ -33,7 +33,7 @@ if TYPE_CHECKING:
         for usage, unit, words in (
             ("noise SHARE", "1", 'Random error of each sweep point, relative to the stiffness |K|: "0.5 %".'),
             ("force-noise SHARE", "1", 'Noise of the force in loops, relative to half its range: "0.3 %".'),
-            ("displacement-noise SHARE", "1", 'Noise of the displacement in loops, of the amplitude: "0.02 %".'),
+            ("displacement-noise SHARE", "1", 'Displacement noise in loops, relative to the amplitude: "0.02 %".'),
             ("gain-error SHARE", "1", 'Gain error of all points of a run (one repeat of one amplitude): "0.4 %".'),
             ("phase-error ANGLE", "rad", 'Phase error of all points of a run, drawn for each run: "0.2 deg".'),
         )

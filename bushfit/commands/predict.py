@@ -168,9 +168,9 @@ def predict(
         maxwell = model_arms(result.model.without(Level.INSTRUMENT), band, arms, RubberConditions(temperature))
         if not maxwell:
             raise ModelError(
-                "the model has nothing that Maxwell arms could represent",
+                "the model has no frequency-dependent branch that Maxwell arms can represent",
                 place="--arms",
-                expected="a model whose stiffness depends on frequency, as by a springpot",
+                expected="a model with frequency-dependent stiffness, for example with a springpot",
             )
     notes = (*notes, *(f"{sweep.name}: {note}" for sweep in measured for note in sweep.notes))
     output = PredictionOutput(result, predictions, measured, notes, resonances, maxwell, curves)

@@ -51,7 +51,7 @@ def simulate_campaign(truth: Model, settings: SimulateSettings, form: Form = "cs
     """
     warnings = []
     if truth.unnamed:
-        warnings.append("the unnamed correction applies to steady states and has no law in time: it is left out")
+        warnings.append("the unnamed correction is left out, because it applies only to steady states, not in time")
         truth = truth.without(UNNAMED)
     simulated = simulate_tests(truth, settings)
     contents = to_files(simulated, form)

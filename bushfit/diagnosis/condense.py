@@ -60,7 +60,7 @@ def shorten_tests(data: PreparedCampaign) -> tuple[PreparedCampaign, tuple[str, 
     if len(loops) < len(data.loops):
         data, total = replace(data, loops=tuple(with_gain_errors(loops, rig))), len(data.loops)
         messages = (
-            f"{len(loops)} of the {total} loops are used in the diagnosis: together they have more than "
+            f"the diagnosis uses {len(loops)} of the {total} loops, because all loops together have more than "
             f"{_MOST_ROWS} rows",
         )
     shortened = {data_set: short for data_set in data.sweeps if (short := _shorten_sweep(data_set))}
@@ -130,10 +130,7 @@ def _shorten_sweep(data_set: MeasuredSweep) -> _ShortSweep | None:
     if levels.size > _MOST_LEVELS:
         some = levels[np.linspace(0, levels.size - 1, _MOST_LEVELS).round().astype(int)]
         rows = rows[np.isin(sweep.held_value[rows], some)]
-        sentence = (
-            f"{some.size} of its {levels.size} runs at one level, or frequency, are used in the diagnosis, evenly "
-            "spread"
-        )
+        sentence = f"the diagnosis uses {some.size} of {levels.size} runs at one level or frequency, evenly spread"
     level_of_row, repeat = sweep.held_value[rows], sweep.repeat[rows]
     step = sweep.step[rows] if sweep.stepped else rows  # if neither is constant, in the order of measurement
     band, long = np.arange(rows.size), list[float]()  # one band for each point

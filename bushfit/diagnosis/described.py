@@ -158,6 +158,6 @@ def _validity(correction: Unnamed, whole: Evidence) -> str:
         for patch in correction.patches
     )
     misfit = max((region.excess for region in find_regions(whole) if region.kind == "loop"), default=0.0)
-    stays = f" (their form still differs by {number(misfit, 2)} times the noise)" if misfit else ""
+    stays = f" (the form of loops still differs by {number(misfit, 2)} times the noise)" if misfit else ""
     loops = f", of loops the first harmonic only{stays}" if split_by_kind(whole.data_sets)[0] else ""
-    return f"valid only between these tests ({patches}){loops}, and of this bushing"
+    return f"valid only between these tests ({patches}){loops}, and for this bushing"

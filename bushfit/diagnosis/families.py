@@ -70,7 +70,7 @@ class FittedFamily:
     def words(self) -> str:
         """Sentence that compares the root mean square held-out residual of the family with that of the first family."""
         if self.gain is None or self.p is None or self.holdout.before is None or self.holdout.after is None:
-            return "no part can be held out of both"
+            return "no part of the tests can be held out of both fits"
         figures = (
             f"held-out error {number(self.holdout.after, 3)} x noise (first family: {number(self.holdout.before, 3)})"
         )
@@ -174,7 +174,7 @@ def _chain(
     effect, present = get_effect(last), chain[-1].model.effects
     if not _can_add(chain[-1].model, last):
         has = "the model has this effect already"
-        problem = has if last in present else "the effect that this one replaces is not in the model"
+        problem = has if last in present else "the effect that this effect replaces is not in the model"
         laws = " or ".join(name for name in (*_RATE, *_AMPLITUDE) if _can_add(chain[-1].model, name))
         raise ModelError(problem, found=last, expected=f"such as {laws}")
     solution = with_effect(chain[-1].solution, chain[-1].data_sets, effect, fixed, bounds)

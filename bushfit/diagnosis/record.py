@@ -31,7 +31,7 @@ from bushfit.validation import to_json_data
 #: Probability above which no further digits are shown.
 _NEARLY_ONE = 0.995
 #: Meaning of the probability of an explanation.
-_MEANING = "Each probability is that of this cause, alone or together with further causes."
+_MEANING = "Probability: chance that the cause is present, alone or together with further causes."
 #: Probability below which other explanations are not mentioned.
 _LEAST_REPORTED = 0.01
 

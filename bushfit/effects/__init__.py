@@ -121,7 +121,7 @@ def register(name: str, law: ModuleType, origin: Origin) -> None:
         ModelError: another effect has this name, or the record or a function is missing or invalid.
     """
     if not name.isidentifier() or (name in LIBRARY and name not in ORIGINS):
-        expected = "a name of letters, digits and _ that the library does not use"
+        expected = "a name of letters, digits and _, different from all names of the library"
         raise ModelError(f"the effect of {origin} cannot have this name", found=name, expected=expected)
     try:
         effect = _build(name, dict(law.EFFECT), law)
@@ -129,7 +129,7 @@ def register(name: str, law: ModuleType, origin: Origin) -> None:
         raise ModelError(
             f"the effect {name} of {origin} cannot be used",
             found=f"{error} ({type(error).__name__})",
-            expected="a dictionary EFFECT with the keys of library.toml, and the functions of its kind",
+            expected="a dictionary EFFECT with keys as in library.toml, and the functions that its kind requires",
         ) from error
     assert isinstance(effect, Effect)  # the name has no place
     LIBRARY[name] = replace(effect, sentence=f"{effect.sentence} (Law of {origin}.)")

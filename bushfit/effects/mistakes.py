@@ -217,7 +217,7 @@ def _build_mistake(name: str, entry: dict[str, Any]) -> Mistake:
     """Build a mistake from its name and its table in mistakes.toml."""
     laws = {key: _LAWS[entry.pop(key)] for key in ("stiffness", "doubt", "motion") if key in entry}
     kinds, units = tuple(entry.pop("kinds", ["sweep"])), entry.pop("units", {}).items()
-    lines = [f'units = {{ {key} = "{unit}" }}, and the same in the header if that states a unit' for key, unit in units]
+    lines = [f'units = {{ {key} = "{unit}" }}, and the same unit in the header, if any' for key, unit in units]
     entry |= laws | dict(zip(("line", "sweep_line"), lines, strict=False))
     return Mistake(name=name, kinds=kinds, **entry)
 

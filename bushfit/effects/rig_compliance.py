@@ -145,7 +145,7 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
         raise ModelError(
             "a rig or sleeve is too compliant to be simulated in time",
             found=f"{float(np.max(compliance)):.3g} m/N",
-            expected="one that is several times stiffer than the bushing",
+            expected="a rig or sleeve several times stiffer than the bushing",
         )
     return computed
 

@@ -71,7 +71,7 @@ class Patch:
         sizes = {len(values) for values in (*lists, self.in_phase_error, self.in_quadrature_error)}
         if len(sizes) > 1 or sizes == {0}:
             found = f"lists of {' and '.join(map(str, sorted(sizes)))} values"
-            raise ValueError(ModelError("no values at nodes", found=found, expected="one value a node, and a node"))
+            raise ValueError(ModelError("lists of unequal length", found=found, expected="equal lists, not empty"))
 
     @cached_property
     def nodes(self) -> Array:

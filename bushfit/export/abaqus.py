@@ -100,7 +100,7 @@ def _materials(request: ExportRequest, units: UnitSystem, series: Sequence[Prony
     long_term = series[0].long_term if series else model.values[LONG_TERM]
     for rank, table in enumerate(stiffness_tables(first), start=1):
         strain = shear_strain(request, table.amplitude)
-        about = f"shear strain amplitude {number(100.0 * strain, 6)} %, that of {describe_amplitudes((table,))}"
+        about = f"shear strain amplitude {number(100.0 * strain, 6)} %, from {describe_amplitudes((table,))}"
         yield from comment_lines("**", [f"COMPOUND_{rank}: {about}"])
         yield f"*MATERIAL, NAME=COMPOUND_{rank}"
         yield "*HYPERELASTIC, NEO HOOKE, MODULI=LONG TERM"

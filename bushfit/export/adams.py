@@ -87,7 +87,7 @@ class _Element(NamedTuple):
         element, model = np.concatenate(written), np.concatenate(exact)
         loss = number(float(np.max(np.abs(loss_factor(element) - loss_factor(model)))), 2)
         return (
-            f"{self.reference.direction}, {kind}: one static curve, and the damping of {number(self.frequency, 4)} Hz: "
+            f"{self.reference.direction}, {kind}: a static curve, with the damping at {number(self.frequency, 4)} Hz: "
             f"the error of |K| is {format_deviation(np.abs(element / model))}, of the loss factor up to {loss}"
         )
 

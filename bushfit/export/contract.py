@@ -22,7 +22,7 @@ from bushfit.reading.measurement import Source
 from bushfit.units import CELSIUS, format_range, is_compatible, number, si_factor
 
 #: SI units of the four quantities of a system.
-_BASES = ("m", "kg", "s", "N")
+_BASES = {"m": "length", "kg": "mass", "s": "time", "N": "force"}
 #: Relative tolerance of force = mass * acceleration in a system.
 _ROUNDING = 1e-6
 #: Bulk data of MSC and NX Nastran, or of Altair OptiStruct.
@@ -53,9 +53,9 @@ class UnitSystem:
         for word in text.replace(",", " ").split():
             base = next((base for base in _BASES if is_compatible(word, base)), None)
             if base is None:
-                raise refuse(f'"{word}" is none of the four units')
+                raise refuse(f'"{word}" is not a unit of length, mass, time or force')
             if base in units:
-                raise refuse(f'"{units[base].name}" and "{word}" measure the same')
+                raise refuse(f'"{units[base].name}" and "{word}" are both units of {_BASES[base]}')
             units[base] = Unit(word, 1.0 / si_factor(word, base))
         if len(units) < len(_BASES):
             raise refuse("a unit is missing")
@@ -149,7 +149,7 @@ class ExportRequest:
             yield "tests", f"{len(campaign.tests)}, {'made ' + ', '.join(days) if days else 'no date stated'}"
         if "temperature" in model.depends_on:
             celsius = number((self.temperature or REFERENCE) - CELSIUS, 3)
-            yield "temperature", f"{celsius} degC, as if it were the same at all times and throughout"
+            yield "temperature", f"{celsius} degC, assumed constant in time and in the whole bushing"
         if measured:
             for place in self.places:
                 unit, factor = place.display.displacement

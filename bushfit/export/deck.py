@@ -67,7 +67,7 @@ def exported_directions(request: ExportRequest) -> list[Prediction]:
             "there is no direction of a bushing to export",
             found=", ".join(map(str, request.places)),
             expected="axial, radial or torsion",
-            hint="csv and xlsx take specimens, too",
+            hint="use the format csv or xlsx, which include specimens",
         )
     grids = [np.unique(prediction.frequency) for prediction in predictions]
     if not all(np.array_equal(grid, grids[0]) for grid in grids):
@@ -235,7 +235,7 @@ def table_omissions(request: ExportRequest, form: StiffnessForm) -> Iterator[str
             unit, factor = place.display.displacement
             low, value, high = (number(table.amplitude * factor, 4) for table in (tables[0], reference, tables[-1]))
             yield (
-                f"{place}: each property has one amplitude. That of {value} {unit} has errors of "
+                f"{place}: each property has one amplitude. The property of {value} {unit} has errors of "
                 f"{format_deviation(ratios)} in |K| at {low} to {high} {unit}"
             )
         if tables[0].frequency.size > 1:

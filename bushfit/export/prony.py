@@ -107,7 +107,7 @@ def prony_omissions(series: Sequence[PronySeries]) -> list[str]:
     low, high = (number(end, 3) for end in series[0].arms.band)
     worst = number(100.0 * max(one.arms.error for one in series), 2)
     sentences = [
-        f"compound: the Prony series is valid from {low} to {high} Hz only, error up to {worst} % of the modulus; "
+        f"compound: the Prony series is valid only from {low} to {high} Hz, error up to {worst} % of the modulus; "
         "positive terms cannot follow friction exactly"
     ]
     if len(series) > 1:
@@ -115,7 +115,7 @@ def prony_omissions(series: Sequence[PronySeries]) -> list[str]:
         ratios = np.concatenate([np.abs(middle.exact / one.exact) for one in series])
         strain, *ends = (number(100.0 * one.strain, 3) for one in (middle, series[0], series[-1]))
         sentences.append(
-            f"compound: each series has one strain amplitude. That of {strain} % has errors of "
+            f"compound: each series has one strain amplitude. The series of {strain} % has errors of "
             f"{format_deviation(ratios)} in |G| at {' to '.join(ends)} %"
         )
     return [*sentences, "compound: friction is a viscous loss at that amplitude, without a force at rest"]

@@ -287,8 +287,8 @@ def implausible_modulus(bushing: Bushing | None, data_sets: Sequence[MeasuredTes
     softest, hardest = (pick(moduli, key=moduli.__getitem__) for pick in (min, max))
     ratio = moduli[hardest] / moduli[softest]
     if ratio > _MOST_STIFFENING:
-        return [f"{hardest} shows {number(ratio, 2)} times the modulus of {softest}, which no rubber does: {_CHECK}"]
-    sentence = f"{hardest}: a shear modulus of {format_range('Pa', moduli[hardest])} is that of no rubber: {_CHECK}"
+        return [f"{hardest} shows {number(ratio, 2)} times the modulus of {softest}, impossible for rubber: {_CHECK}"]
+    sentence = f"{hardest}: a shear modulus of {format_range('Pa', moduli[hardest])} is impossible for rubber: {_CHECK}"
     return [] if _SOFTEST < moduli[hardest] < _HARDEST else [sentence]
 
 
@@ -299,7 +299,7 @@ def check_strain(bushing: Bushing | None, data_sets: Sequence[MeasuredTest]) -> 
         if (strain := largest * unit_strain(bushing, data_set.direction)) > _MOST_STRAIN:
             amplitude = format_range(data_set.direction.motion.displacement_unit, largest)
             raise FitError(
-                "no rubber bears the amplitude of this test",
+                "the strain of this test is too large for any rubber",
                 place=data_set.name,
                 found=f"{amplitude}, {data_set.direction}: a strain of {number(100 * strain, 2)} %",
                 expected=f"a strain below {100 * _MOST_STRAIN:g} %",

@@ -63,7 +63,7 @@ def steady_cycles(loop: Loop) -> tuple[Loop, float, float, str | None]:
             found=f"none from {time[widest]:.4g} to {time[widest + 1]:.4g} s; the number of cycles, and "
             "therefore the frequency, is unknown",
             expected="no gap longer than a third of a cycle",
-            hint="keep the whole cycles before the gap, or those after it",
+            hint="keep only the whole cycles before the gap, or only the cycles after the gap",
         )
     return part, frequency, cycles, note
 
@@ -104,7 +104,7 @@ def _steady_part(loop: Loop, time: Array, motion: Array) -> tuple[Loop, str | No
         whole = _cut(loop, first, last)
         part, note = _steady_part(whole, *_thinned(whole))
         sentence = f"rows are missing; of {time[-1] - time[0]:.3g} s only {first:.4g} to {last:.4g} s are used"
-        return part, sentence if note is None else f"{sentence}, and of these {note}"
+        return part, sentence if note is None else f"{sentence}; of this part, {note}"
     spans = steady_spans(loop, time, motion)
     if not spans:
         return loop, None
@@ -297,7 +297,7 @@ def wrong_clock(loop: Loop, coefficients: Array) -> str | None:
     if waveform(coefficients) != opposite:
         return None
     return (
-        f"{100 * outer:.2g} % of the rows lie beyond {_OUTER:g} of the amplitude, like those of {like} recorded "
+        f"{100 * outer:.2g} % of the rows lie beyond {_OUTER:g} of the amplitude, as for {like} recorded "
         f"evenly in time, but the {loop.direction.motion.words[0]} over time is {opposite}. For a file without time, "
         'rate means a triangle, and frequency with waveform = "sine" means a sine'
     )

@@ -95,8 +95,8 @@ def with_excess_errors(
     if errors.significant:
         found, error = with_model_error(found, bounds, certain=True)
     text = (
-        f"levels disagree by more than their repeats, as by an error of {format_class_errors(errors.error)} for each "
-        "level: parameters are the closest fit, and their intervals include this error"
+        f"levels disagree by more than their repeats, as if each had an error of {format_class_errors(errors.error)}: "
+        "parameters are the closest fit, and their intervals include this error"
     )
     return found, error, [text] if error else []
 

@@ -107,7 +107,7 @@ class PreparedCampaign:
             return [*self.preload_notes]
         return [
             *self.preload_notes,
-            "no test was repeated at three points or more: the errors shared by a run are those of the class of the "
+            "no test was repeated at three points or more: errors shared by a run are taken from the class of the "
             f"rig, {describe_class(self.campaign.rig)}",
         ]
 

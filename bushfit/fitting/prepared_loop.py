@@ -241,7 +241,7 @@ def _check_loses_energy(prepared: PreparedLoop) -> None:
             "the loop releases energy, which no bushing does",
             file=prepared.loop.source.file if prepared.loop.source else None,
             found=f"a loss factor of {stiffness.imag / stiffness.real:.3g}: the force lags behind the displacement",
-            expected="a force that runs ahead of the displacement",
+            expected="a force that leads the displacement",
             hint="are the columns of displacement and force swapped, or do the rows run backwards in time? Name the "
             'columns in the campaign: columns = { displacement = "...", force = "..." }. A filter or a delay of the '
             f"force by more than {late} ms does the same",

@@ -99,7 +99,7 @@ def estimate(problem: FitProblem, *, robust: bool = False, lmfit: bool = False) 
     raise FitError(
         "the robust fit does not converge",
         found=f"{_MOST_ROUNDS} rounds of reweighting",
-        hint="look at the rows that --loss linear warns of, and take them out of the file",
+        hint="look at the rows that --loss linear warns of, and remove these rows from the file",
     )
 
 

@@ -86,7 +86,7 @@ def start_values(
     inside = {name: float(np.clip(value, *get_parameter(name).bounds)) for name, value in found.items()}
     if inside != found and (reasons := implausible_modulus(bushing, data_sets)):
         raise FitError(
-            "the moduli of these tests are outside those of all rubbers",
+            "the moduli of these tests are impossible for rubber",
             found=reasons[0],
             hint="if units and dimensions are right, give start values in [fit] of the campaign",
         )

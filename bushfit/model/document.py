@@ -135,7 +135,7 @@ def _check_covariance(table: CovarianceTable) -> CovarianceTable:
         raise ValueError(ModelError("a covariance that is not symmetric", place="matrix", expected="C = C^T"))
     if not np.linalg.eigvalsh(correlation).min() > -_ROUNDING * size:
         expected = "a positive semidefinite matrix"
-        raise ValueError(ModelError("a covariance that no quantities have", place="matrix", expected=expected))
+        raise ValueError(ModelError("an impossible covariance", place="matrix", expected=expected))
     return table
 
 
@@ -169,7 +169,7 @@ class FitTable(Quality):
             low, high = getattr(self, key) or (1.0, 1.0)
             if not SIZES[0] <= low <= high <= SIZES[1]:
                 found, expected = f"{low:g}, {high:g}", "least and largest, above zero"
-                raise ValueError(ModelError("this is not a range", place=key, found=found, expected=expected))
+                raise ValueError(ModelError("this range is not valid", place=key, found=found, expected=expected))
         for key in ("nrmse", "reduced_chi_square", "points", "noise"):
             if getattr(self, key) < 0.0:
                 found = f"{getattr(self, key):g}"

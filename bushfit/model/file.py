@@ -220,7 +220,7 @@ def require_schema(document: Mapping[str, Any], file: Path | None, kind: str, *s
     """
     if document.get("schema") not in schemas:
         raise ModelError(
-            f"not {kind} this version reads",
+            f"this version cannot read the file as {kind}",
             file=file,
             place="schema",
             found=repr(document.get("schema")),
@@ -249,7 +249,7 @@ def _read_json(file: Path) -> Any:
     try:
         return json.loads(data.decode("utf-8-sig"), object_pairs_hook=_refuse_duplicates)
     except (ValueError, RecursionError) as error:
-        hint = "give the file as bushfit fit wrote it"
+        hint = "use the file unchanged, as bushfit fit wrote it"
         raise ModelError(
             "this is not valid JSON", file=file, found=str(error), expected="a model file", hint=hint
         ) from error

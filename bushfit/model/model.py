@@ -117,11 +117,11 @@ class Model:
         """Raise a ModelError if an effect has no law in time."""
         if names := self.without_time_law:
             raise ModelError(
-                "this needs a law in time, which an effect of the model does not have",
+                "an effect of the model has no law in time, which this calculation needs",
                 place=" and ".join(names),
                 found="a law of the steady first harmonic alone",
                 expected="effects with a law in time",
-                hint="use a model without it, or predict the steady state",
+                hint="use a model without this effect, or predict the steady state",
             )
 
     @property

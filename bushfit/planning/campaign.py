@@ -63,7 +63,7 @@ def campaign_toml(knowledge: Knowledge, planned: Sequence[Test]) -> str:
     settings, tested = simulation_settings(planned, knowledge.noise), [test.direction for test in planned]
     lines = [
         "# Planned by bushfit plan; bushfit simulate computes these tests from the model below. No rubber was tested.",
-        "# All repeats of a sweep follow each other here; the order on the rig is that of the sheet.",
+        "# All repeats of a sweep follow each other here; the order on the rig is given in the plan sheet.",
         *body_lines(knowledge.model.bushing, dict.fromkeys(place for place in tested if isinstance(place, Specimen))),
         *("", "[simulate]", *_key_lines(settings)),
         *("", "[simulate.parameters]"),

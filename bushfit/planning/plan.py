@@ -103,10 +103,10 @@ def explain_miss(search: PlanSearch, goal: PlannedQuantity) -> str | None:
     counts, limit, covariance = search.counts, search.limit_covariance, search.error_covariance
     if sentence := search.untested_warning(goal, counts):
         origin = "in the plan" if goal.place in search.request.places else "on offer"
-        return f"no test so far or {origin} covers this: {sentence}"
+        return f"no test so far or {origin} covers this target: {sentence}"
     if not goal.met(limit):
         reached, reason = format_half_width(goal.half_width(limit)), goal.explain_limit(search.knowledge, limit)
-        return f"no available test meets it; {UNLIMITED_RUNS} runs of each would reach {reached}: {reason}"
+        return f"no available test is enough; {UNLIMITED_RUNS} runs of each would reach {reached}: {reason}"
     if goal.met(covariance(counts)):
         return None
     more = add_runs(
@@ -117,9 +117,9 @@ def explain_miss(search: PlanSearch, goal: PlannedQuantity) -> str | None:
     )
     hours = number(search.budget.spent(more) / 60.0, 2)
     if goal.met(covariance(more)):
-        return f"{number(search.budget.maximum_minutes / 60.0, 3)} h are too few, about {hours} h would do"
+        return f"{number(search.budget.maximum_minutes / 60.0, 3)} h are too few; about {hours} h are needed"
     reached = format_half_width(goal.half_width(covariance(more)))
-    return f"{hours} h would reach {reached}, and no further run would reduce that by a quarter per cent"
+    return f"{hours} h would reach {reached}, and no further run would reduce the error by 0.25 %"
 
 
 def describe_purpose(search: PlanSearch, test: int) -> str:
@@ -173,12 +173,12 @@ def explain_free_hours(search: PlanSearch, missed: Sequence[str | None]) -> str 
     free = hours - planned
     if free <= float(budget.minutes.max() + budget.setup_minutes) / 60.0:
         return None
-    reason = "no further run would reduce the error by a quarter per cent"
+    reason = "no further run would reduce the error by 0.25 %"
     is_shorter = budget.maximum_minutes < 60.0 * hours
     if request.aim == "rivals" and is_shorter:
         reason = "these tests distinguish the rivals"
     elif missed and is_shorter:
-        reason = "further runs would meet no missed target" if any(missed) else "all targets are met"
+        reason = "further runs would not meet the missed targets" if any(missed) else "all targets are met"
     if not search.counts.any():
         needed = "would help" if any(missed) else "is needed"
         return f"no test {needed}: {reason}, and all {number(hours, 3)} h remain free"
@@ -203,7 +203,7 @@ def plan_warnings(search: PlanSearch) -> Iterator[str]:
     if model_error > _NOTABLE_RATIO - 1.0:
         yield (
             f"the errors of the stiffness include the model error, up to {number(100.0 * model_error, 2)} %, "
-            "which no test reduces; bushfit diagnose looks for the missing effect"
+            "which further tests do not reduce; bushfit diagnose looks for the missing effect"
         )
     yield from knowledge.result.warnings
     if knowledge.bounded:
@@ -212,12 +212,12 @@ def plan_warnings(search: PlanSearch) -> Iterator[str]:
             "include half of the additional error of a fit without the bound"
         )
     if search.goals and not search.determines_scatter(counts):
-        yield "too few repeats determine the scatter of sweeps: intervals may become 1.5 times as wide as planned"
+        yield "repeats are too few to determine the scatter of sweeps: intervals may be 1.5 times as wide as planned"
     if effects := search.less_visible_effects(counts):
         yield f"the standard programme shows these effects better: {', '.join(effects)}"
     for pair in np.argwhere(np.triu(~search.separable_rivals, 1)).tolist():
         names = (knowledge.rivals[rival].model.effects[-1] for rival in pair)
-        yield f"no test of this rig would distinguish {' from '.join(names)}: they are left out"
+        yield f"no test of this rig would distinguish {' from '.join(names)}: these rivals are left out"
     if knowledge.rivals and (chi_square := search.nearest_rivals(counts)) < RIVALS_APART:
         yield (
             f"the expected chi-square between the nearest rivals is {number(chi_square, 2)}, less "

@@ -93,13 +93,13 @@ def caveats(result: Result) -> list[str]:
         lines.append("the model has no springpot: its stiffness does not depend on frequency")
     if unnamed := result.model.unnamed:
         lines.append(
-            "the unnamed correction follows the measurement and no law: outside the measured range it fades, "
+            "the unnamed correction follows the measurement, not a law: outside the measured range, it fades "
             f"and the band widens by up to +/-{number(100.0 * Z95 * unnamed.far_deviation, 2)} %"
         )
         lines.append(
             "the unnamed correction is assigned to the bushing, but these tests cannot distinguish it "
-            "from one of the rig: if it belongs to the rig, the bushing in the car does not have it, up to "
-            f"{number(100.0 * unnamed.largest, 2)} % of |K|"
+            "from an effect of the rig: if it belongs to the rig, |K| of the bushing in the car differs by up to "
+            f"{number(100.0 * unnamed.largest, 2)} %"
         )
     if result.measured is None:
         lines.append("the model was not fitted: it has no uncertainty and no fitted range")
@@ -154,7 +154,7 @@ def unfitted_warnings(result: Result, direction: Place) -> Iterator[str]:
             )
         return
     radially = direction.axis is Direction.RADIAL or (Direction.AXIAL not in axes and Direction.RADIAL in axes)
-    formula, error = Direction.TORSION, "which replaces the uneven strain by one value"
+    formula, error = Direction.TORSION, "because the formula replaces the uneven strain by one value"
     if radially and bushing:
         formula, error = Direction.RADIAL, _radial_error(bushing)
     if formula in corrected:

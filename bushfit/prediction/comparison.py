@@ -266,7 +266,7 @@ def _describe_difference(band: Band, unit: str, contrast: Contrast) -> str:
 
     if not len(band.root):
         ends = (number(round(end, _MOST_DECIMALS), 3, "+") for end in (band.value.min(), band.value.max()))
-        return f"{' to '.join(dict.fromkeys(ends))}{unit} by value, of unknown error"
+        return f"{' to '.join(dict.fromkeys(ends))}{unit} (error unknown)"
     parts = []
     for sure, word in ((band.low > 0.0, "higher"), (band.high < 0.0, "lower")):
         if sure.any():
@@ -282,7 +282,9 @@ def _describe_difference(band: Band, unit: str, contrast: Contrast) -> str:
     none = (band.low <= 0.0) & (band.high >= 0.0)
     if none.any():
         largest = number(float(np.maximum(-band.low, band.high)[none].max()), 2)
-        parts.append(f"{'elsewhere ' if parts else ''}no difference detected (up to {largest}{unit} is possible)")
+        parts.append(
+            f"{'elsewhere ' if parts else ''}no difference detected (up to {largest}{unit} cannot be excluded)"
+        )
     return ", ".join(parts)
 
 

@@ -93,7 +93,7 @@ def predict_resonance(
         ModelError: the direction has no displacement and force, such as torsion.
     """
     if place.motion is not TRANSLATION:
-        raise ModelError("this cannot carry a mass", found=str(place), expected="a direction or mount with a stiffness")
+        raise ModelError("a mass needs a translation", found=str(place), expected="axial, radial or a mount")
     bushings, *rig_models = car_models(result.model, result.unresolved)
     conditions = RubberConditions(temperature, preload=tested_preload(result, place, preload))
     if frequencies is None:

@@ -222,12 +222,12 @@ def _warnings(result: Result, response: TimeResponse, left_out: list[str], tempe
             f"{number(np.abs(response.strain_rate).max(), 3)} 1/s, but fitted at up to {number(response.tested[1], 3)}"
         )
         warnings.append(
-            f"{place}: strain rates of up to {rate} 1/s only, in {number(100.0 * share, 2)} % of the time: {BEYOND}"
+            f"{place}: strain rates up to {rate} 1/s only, in {number(100.0 * share, 2)} % of time: {BEYOND}"
         )
     if (result.model.unnamed or result.model_error) and "friction" in result.model.effects:
         warnings.append(
             f"{place}: friction laws that agree in sines can differ in a mixed motion by more than the band: compare "
-            "with a fit that has --effect distributed_sliders, or with a [[validation]] record"
+            "with a fit with --effect distributed_sliders, or with a [[validation]] record"
         )
     if left_out:
         warnings.append(f"{place}: {' and '.join(left_out)} left out, because no law describes this motion")

@@ -119,7 +119,7 @@ def predict(
     """
     for name, values in (("frequency", frequencies), ("amplitude", amplitudes)):
         if not (np.size(values) and np.all(np.isfinite(values)) and np.min(values) > 0):
-            raise ModelError(f"impossible {name} to predict at", found=str(np.asarray(values)), expected="above zero")
+            raise ModelError(f"impossible {name}", found=str(np.asarray(values)), expected="above zero")
     amplitude, frequency = (
         axis.ravel() for axis in np.meshgrid(np.unique(amplitudes), np.unique(frequencies), indexing="ij")
     )
@@ -213,15 +213,15 @@ def tested_preload(result: Result, place: Place, preload: Preload | None) -> Pre
     if tested is None:
         raise refuse(
             "the model was not fitted to several preloads of this direction",
-            expected="tests at two preloads or more",
-            hint='state preload = "500 N" for each test of the campaign, "none" without, and fit it again',
+            expected="tests at two or more preloads",
+            hint='state preload = "500 N" for each test of the campaign, "none" without preload, and fit again',
         )
     margin = SAME_PRELOAD * max(abs(tested.low), abs(tested.high))
     if preload.unit != tested.unit and preload.value:
         raise refuse("the tests state the preload in another quantity", expected=tested.text(place))
     if not tested.low - margin <= preload.value <= tested.high + margin:
         hint = "test the bushing at this preload, and fit all tests together"
-        raise refuse("this preload is outside of the tests", expected=tested.text(place), hint=hint)
+        raise refuse("this preload is outside the tested range", expected=tested.text(place), hint=hint)
     return Preload(preload.value, tested.unit)
 
 

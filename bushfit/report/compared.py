@@ -110,9 +110,9 @@ class PlaceDifferences:
         sizes = {len(cells) for cells in columns.values()}
         if len(sizes) != 1 or 0 in sizes or not all(name.endswith(", sure") for name in texts):
             raise ModelError(
-                "columns that do not go together",
+                "the columns do not fit together",
                 place=f"pairs, {label}, places, {place}",
-                expected="as many numbers in each, and yes or no in those that end in sure",
+                expected="equally long columns, with yes or no in columns whose names end in sure",
             )
         types = dict.fromkeys(columns.keys() - {*texts}, float)
         table = pd.DataFrame({"other": label, "place": place, **columns}).astype(types)
@@ -161,9 +161,9 @@ class ComparisonDocument:
         places = {tuple(pair["places"]) for pair in checked["pairs"]}
         if not expected or len(expected) < len(other_labels) or pairs != expected or len(places) > 1 or () in places:
             rule = "each result but the first compared with the first, at the same places"
-            raise ModelError("results that do not go together", file=file, place="pairs", expected=rule)
+            raise ModelError("the results do not fit together", file=file, place="pairs", expected=rule)
         if families and [family["label"] for family in families] != [first, *other_labels]:
-            raise ModelError("families that do not go together", file=file, place="families", expected="all compared")
+            raise ModelError("the families do not fit together", file=file, place="families", expected="all compared")
         return cls(checked)
 
     @cached_property

@@ -382,5 +382,5 @@ def require_columns(rows: pd.DataFrame, *headers: str) -> pd.DataFrame:
 
 def missing_column(header: str) -> ModelError:
     """Error for a table without the column `header`."""
-    hint = "write the results again, or remove the table: the page then omits it"
+    hint = "write the results again, or remove the file: the page then omits the table"
     return ModelError("a column of a table is missing", expected=header, hint=hint)

@@ -210,7 +210,7 @@ def test_a_campaign_that_kills_its_worker_is_told_once_and_the_others_go_on(type
     ("report", "words"),
     [
         ("old.xml", "that bushfit did not write"), ("old.xml/r.xml", "not a folder"),
-        ("bushings", "a folder has the name of a result file"), ("all/bushings/b0/r.xml", "inside the results"),
+        ("bushings", "a folder has the name of a result file"), ("all/bushings/b0/r.xml", "in the results folder"),
         ("all/bushings/../batch.csv", "replace the table"), ("all/batch.png", "replace the table"),
     ],
 )  # fmt: skip

@@ -23,7 +23,7 @@ IN_CAMPAIGN = [
     *(('length = "34 mm"', f'length = "34 mm"\n[compound]\nhardness = {text}\nfiller = "27 phr"', "campaign.toml, compound.hardness", said) for text, said in (('"61"', "61 Shore A"), ('"61 Shore D"', "61 Shore A"), ('"-61 Shore A"', "61 Shore A"), ("61", "61 Shore A"), ('"95 Shore A"', "95 Shore A"))),
     *(('length = "34 mm"', f'length = "34 mm"\n[compound]\nhardness = "61 Shore A"\nfiller = {text}', "campaign.toml, compound.filler", said) for text, said in (('"27"', "27 phr"), ('"27 %"', "27 phr"), ('"27 phr silica"', "27 phr"), ("true", "27 phr"), ('"500 phr"', "500 phr"))),
     ('length = "34 mm"', 'length = "1 mm"\nshape = "calibrated"', "campaign.toml, shape: the calibrated formulas do not cover this shape", "inner/outer 0.15 to 0.92 and length/outer 0.1 to 60"),
-    ('"loop.csv"', r'"C:\Tests.csv"', "campaign.toml, line 8, column", "write / for each \\ of a path"),
+    ('"loop.csv"', r'"C:\Tests.csv"', "campaign.toml, line 8, column", "write / instead of \\ in a path"),
     ("[[sweeps]]", "[[loops]]\nfile = 'x'\n[loops]", "campaign.toml, line 13, column", "list several tests under [[loops]]"),
     ("[[loops]]", "[loops]", "campaign.toml, loops: this value is not understood", "write [[loops]], in two brackets"),
     ('"loop.csv"', '"lop.csv"', "lop.csv: there is no such file", 'did you mean "loop.csv"?'),
@@ -40,12 +40,12 @@ IN_CAMPAIGN = [
     ('"loop.csv"', '"loop.csv"\nheader_line = 0', "loop.csv: there is no header on this line", "lines count from 1"),
     ('"loop.csv"', '"loop.csv"\nsheet = "Tabelle1"', "loop.csv: this is not a workbook", "a file with groups"),
     ('direction = "axial"', 'direction = "up"', "campaign.toml, loops #1.direction: this value is not understood", "'axial', 'radial' or 'torsion'"),
-    ('direction = "axial"\n\n[[sweeps]]', "\n[[sweeps]]", "campaign.toml, loop.csv: a test without a direction", "direction ="),
+    ('direction = "axial"\n\n[[sweeps]]', "\n[[sweeps]]", "campaign.toml, loop.csv: the direction of the test is not stated", "direction ="),
     ('file = "sweep.csv"', 'file = "sweep.csv"\namplitude = "double"', "campaign.toml, sweeps #1.amplitude: this value is not understood", "'zero-to-peak', 'peak-to-peak' or 'rms'"),
     ('file = "sweep.csv"', 'file = "loop.csv"', "loop.csv, line 1: no pair of columns gives a complex stiffness", 'correct the header, or name the columns in the campaign: columns = { stiffness = "..." }'),
     ('[[sweeps]]\nfile = "sweep.csv"\ndirection = "axial"\n', '[[loops]]\nfile = "./loop.csv"\ndirection = "axial"\n', "loop.csv, line 1: a file is listed twice", "each file once, or a column that selects the rows of each test"),
-    ('file = "sweep.csv"', 'file = "sweep.csv"\nat_amplitude = "0.1 mm"', 'sweep.csv, line 8, column "amplitude [mm]": the amplitude is not the one that is stated', "take at_amplitude out of the campaign"),
-    ('file = "sweep.csv"', 'file = "sweep.csv"\nat_frequency = "5 Hz"', 'sweep.csv, line 3, column "frequency [Hz]": the frequency is not the one that is stated', "take at_frequency out of the campaign"),
+    ('file = "sweep.csv"', 'file = "sweep.csv"\nat_amplitude = "0.1 mm"', 'sweep.csv, line 8, column "amplitude [mm]": the amplitude in the file differs from the stated amplitude', "remove at_amplitude from the campaign"),
+    ('file = "sweep.csv"', 'file = "sweep.csv"\nat_frequency = "5 Hz"', 'sweep.csv, line 3, column "frequency [Hz]": the frequency in the file differs from the stated frequency', "remove at_frequency from the campaign"),
     *(('"10 mm"', f'"{size} mm"', "campaign.toml, bushing.inner_radius: no bushing has this", "a length from 1e-10 to 100 m") for size in ("1e-300", "1e300", "1e200")),
     ('"34 mm"', '"1 nm"', "campaign.toml, length: impossible bushing", "1e-06 to 100 m"),
 ]
@@ -70,9 +70,9 @@ IN_MORE = [
     ('frequency = "0.1 Hz"', 'frequencies = ["0.001 Hz", "10 Hz"]', "simulate.loops: a programme of loops is too long to simulate", "use shorter pauses, or simulate slow and fast loops in separate programmes"),
     ('specimen = "DMA"', 'specimen = "DMB"', "more.toml, simulate.sweeps #2: this specimen is not in the campaign", "one of DMA"),
     ('specimen = "DMA"', 'specimen = "DMA"\ndirection = "axial"', "more.toml, simulate.sweeps #2: a specimen has no such direction", 'direction = "shear", or none'),
-    ('specimen = "DMA"\n', "", "more.toml, simulate.sweeps #2: a test without a direction", 'or specimen = "DMA"'),
-    ('direction = "radial"', 'direction = "torsion"', "more.toml, simulate.resonances #1: this cannot carry a mass", "a direction with a displacement, or a specimen in shear"),
-    ('"500 Hz"', '"60 Hz"', "more.toml, simulate.resonances #1: no frequencies of a shaker", "at least 12, from below to above the resonance"),
+    ('specimen = "DMA"\n', "", "more.toml, simulate.sweeps #2: the direction of the test is not stated", 'or specimen = "DMA"'),
+    ('direction = "radial"', 'direction = "torsion"', "more.toml, simulate.resonances #1: a mass needs a translation", "a direction with a displacement, or a specimen in shear"),
+    ('"500 Hz"', '"60 Hz"', "more.toml, simulate.resonances #1: too few frequencies", "at least 12, from below to above the resonance"),
 ]
 #: (name, content of the campaign, what the error says ...)
 WHOLE_CAMPAIGNS = [

@@ -10,7 +10,7 @@ NODES = {"frequency_Hz": [5.0], **{key: [0.01] for key in ("strain", "in_phase",
 PATCH = {"directions": ["axial"], **NODES}
 #: (name, change of the model file, what the error says ...)
 IN_MODEL = [
-    ("another schema", entry("schema", value="bushfit/model/9"), "model.json, schema: not a model this version reads", "use a file written by bushfit fit-static, fit-dynamic, fit or diagnose"),
+    ("another schema", entry("schema", value="bushfit/model/9"), "model.json, schema: this version cannot read the file as a model", "use a file written by bushfit fit-static, fit-dynamic, fit or diagnose"),
     ("no bushing", without("bushing"), "model.json, bushing: a key is missing", "bushing = ..."),
     ("name is a number", entry("bushing", "name", value=3), "model.json, bushing.name: this value is not understood", "a text in quotes"),
     ("name of control characters", entry("bushing", "name", value="a\x1b[2Jb\n"), "model.json, bushing.name: this value is not understood", "found: a\\x1b[2Jb\\n", "one line without control characters"),
@@ -20,7 +20,7 @@ IN_MODEL = [
     ("values of an effect that is not there", entry("effects", value=["elastic", "friction"]), "model.json, m: unknown parameter", "one of mu, sigma_fmax, eps_half"),
     ("a correction without its data", entry("effects", value=["elastic", "springpot", "friction", "unnamed"]), "model.json, unnamed: an effect without its data"),
     ("a correction of no size", entry("unnamed", value={"size": 0.0, "lengths": [1.0, 1.0], "patches": [PATCH]}), "model.json, unnamed.size", "expected: greater than 0"),
-    ("a correction with a value too few", entry("unnamed", value={"size": 0.1, "lengths": [1.0, 1.0], "patches": [{**PATCH, "strain": []}]}), "model.json, unnamed", "no values at nodes"),
+    ("a correction with a value too few", entry("unnamed", value={"size": 0.1, "lengths": [1.0, 1.0], "patches": [{**PATCH, "strain": []}]}), "model.json, unnamed", "lists of unequal length"),
     ("a correction at no strain", entry("unnamed", value={"size": 0.1, "lengths": [1.0, 1.0], "patches": [{**PATCH, "strain": [0.0]}]}), "model.json, unnamed.patches #1.strain #1", "expected: greater than 0"),
     ("parameter is missing", without("parameters", "mu"), "model.json, mu: a parameter has no value", "a number [Pa]"),
     ("value is NaN", entry("parameters", "mu", "value", value=nan), "model.json, parameters.mu.value: this value is not understood", "a finite number"),
@@ -35,10 +35,10 @@ IN_MODEL = [
     ("row of an outlier in quotes", entry("outliers", value=[{"test": "a", "file": None, "row": "7", "column": "force", "distance": 9}]), "model.json, outliers #1.row: this value is not understood", "a whole number"),
     *((f"outer radius of {size:g}", entry("bushing", "outer_radius_m", value=size), "model.json, ", "impossible bushing") for size in (1e50, 1e-300, 1e4)),
     ("outer radius of 1e300", entry("bushing", "outer_radius_m", value=1e300), "model.json, bushing.outer_radius_m: this value is not understood", "less than or equal to 1e+100"),
-    ("a strain that falls", entry("fit", "strain", value=[1, 0]), "model.json, fit.strain: this is not a range", "found: 1, 0"),
+    ("a strain that falls", entry("fit", "strain", value=[1, 0]), "model.json, fit.strain: this range is not valid", "found: 1, 0"),
     ("negative noise", entry("fit", "noise", value=-1), "model.json, fit.noise: no fit has this", "zero or more"),
-    ("a covariance of no quantities", entry("covariance", value={"names": ["mu", "m"], "matrix": [[1e6, 1e9], [1e9, 1e6]]}), "model.json, covariance.matrix: a covariance that no quantities have", "a positive semidefinite matrix"),
-    ("a covariance with nothing beside it", entry("covariance", value={"names": ["mu", "m"], "matrix": [[0, 1], [1, 1]]}), "model.json, covariance.matrix: a covariance that no quantities have"),
+    ("a covariance of no quantities", entry("covariance", value={"names": ["mu", "m"], "matrix": [[1e6, 1e9], [1e9, 1e6]]}), "model.json, covariance.matrix: an impossible covariance", "a positive semidefinite matrix"),
+    ("a covariance with nothing beside it", entry("covariance", value={"names": ["mu", "m"], "matrix": [[0, 1], [1, 1]]}), "model.json, covariance.matrix: an impossible covariance"),
     ("a covariance that is not symmetric", entry("covariance", value={"names": ["mu", "m"], "matrix": [[1e6, 5e5], [-5e5, 1e6]]}), "model.json, covariance.matrix: a covariance that is not symmetric"),
     ("a parameter twice", entry("covariance", value={"names": ["mu", "mu"], "matrix": [[1e6, 0], [0, 1e6]]}), "model.json, covariance.names: a parameter twice"),
     ("a spread of two names", entry("covariance", value={"names": ["mu"], "matrix": [[1e6]], "spread": [[[1, 2]]]}), "model.json, covariance", "a covariance that does not match its names", "1 x 1"),
@@ -53,7 +53,7 @@ IN_PREDICTED = [
 #: (name, content of the model file, what the error says ...)
 WHOLE_MODELS = [
     ("model is a list", "[]", "model.json: not a model", "a JSON object { ... }"),
-    ("a key twice", '{"schema": "bushfit/model/1", "schema": "bushfit/model/1"}', "model.json: this is not valid JSON", "give the file as bushfit fit wrote it"),
-    ("an integer of many digits", '{"schema": ' + "9" * 5000 + "}", "model.json: this is not valid JSON", "give the file as bushfit fit wrote it"),
+    ("a key twice", '{"schema": "bushfit/model/1", "schema": "bushfit/model/1"}', "model.json: this is not valid JSON", "use the file unchanged, as bushfit fit wrote it"),
+    ("an integer of many digits", '{"schema": ' + "9" * 5000 + "}", "model.json: this is not valid JSON", "use the file unchanged, as bushfit fit wrote it"),
     ("a model of 10 MB", " " * 10_000_001 + "{}", "model.json: the file is too large", "bushfit fit writes a model.json"),
 ]

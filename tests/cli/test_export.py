@@ -220,7 +220,7 @@ def test_every_format_at_once_and_what_it_leaves_out(bushfit, tmp_path):
         of_line = ", ".join(name for name, each in found["formats"].items() if line in each["left_out"])
         assert done.stderr.count(f"limit of {of_line}: {line}\n") == 1
     for words in (
-        "axial: each property has one amplitude. That of 0.2 mm has errors of ",
+        "axial: each property has one amplitude. The property of 0.2 mm has errors of ",
         "axial: the 95 % band of up to ",
         "no law in time",
         "no stiffness in torsion, rotations about x and y",
@@ -243,7 +243,7 @@ def test_a_prony_series_and_stated_constants(bushfit, tmp_path):
     assert text.count("TIME=PRONY") == 1
     assert f"{table['g_i [-]'][0]:.6E}, 0., " in text
     assert "6.8755E+04" in text  # 1.2 N m/deg in N mm/rad
-    assert "the Prony series is valid from 5 to 155 Hz only, error up to" in done.stderr
+    assert "the Prony series is valid only from 5 to 155 Hz, error up to" in done.stderr
     assert "the stated constant, 68.755 N m/rad, loss factor 0.1" in done.stderr
 
 

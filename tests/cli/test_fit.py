@@ -143,7 +143,7 @@ def test_a_wrong_unit_is_the_headline(own):
     sweep["stiffness [N/mm]"] *= 1000.0
     sweep.to_csv(own / SWEEP, index=False)
     verdict, action = typing(own)("fit", CAMPAIGN, "-o", "x", "--no-plots").stderr.splitlines()[:2]
-    assert "which no rubber does: check the units" in verdict
+    assert "impossible for rubber: check the units" in verdict
     assert action.split()[1:3] == ["bushfit", "diagnose"]
 
 

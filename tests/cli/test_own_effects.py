@@ -63,7 +63,7 @@ def test_a_file_is_run_only_with_permission_and_only_as_it_was(bushfit, root, tm
     [
         ("my_law", "import no_such_module\n", ["ModuleNotFoundError"]),
         ("my_law", "def modulus(p, omega, strain): ...\n", ["EFFECT"]),
-        ("my_law", "EFFECT = {}\n", ["the functions of its kind"]),
+        ("my_law", "EFFECT = {}\n", ["the functions that its kind requires"]),
         ("my_law", "EFFECT = {'sentense': 'x'}\nmodulus = stress = print\n", ["the effect my_law of"]),
         ("my_law", "x = (\n", ["SyntaxError"]),
         ("viscous", "", ["cannot have this name", "viscous"]),

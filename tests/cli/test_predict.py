@@ -73,7 +73,7 @@ def test_predict_lays_measurements_over_takes_grids_and_shows_at_most_eight_ampl
     assert dict(zip(measured["direction"], measured["fitted"], strict=True)) == {"axial": "yes", "radial": "no"}
     assert measured["measured over model [-]"].between(0.95, 1.05).all()
     axial, radial = (line for line in done.stderr.splitlines() if ": expected error " in line)
-    assert (axial.endswith("all fitted)"), radial.endswith("each left out of the fit)")) == (True, True)
+    assert (axial.endswith("all fitted)"), radial.endswith("each left out of the fit in turn)")) == (True, True)
     table = pd.read_csv(tmp_path / "x" / "axial.csv")
     assert table["frequency [Hz]"].tolist() == [10, 20, 30] * 2
     assert table["amplitude [mm]"].tolist() == [0.1] * 3 + [0.3] * 3
@@ -277,8 +277,12 @@ def test_a_plan_for_targets_stops_once_they_are_met(root, tmp_path):
     [
         (NEW, ("stiffness=0.001 %",), "the class of the rig, 0.5 % of gain and 4.4 mrad of phase"),
         (NEW, ("loss_factor=0.01 %",), "the class of the rig, 0.5 % of gain and 4.4 mrad of phase"),
-        (NEW, ("mu=0.25 %", "--hours", "2"), "2 h are too few, about"),
-        (NEW, ("stiffness.radial=5 %", "--direction", "axial"), "so far or on offer covers this: radial: not fitted"),
+        (NEW, ("mu=0.25 %", "--hours", "2"), "2 h are too few; about"),
+        (
+            NEW,
+            ("stiffness.radial=5 %", "--direction", "axial"),
+            "so far or on offer covers this target: radial: not fitted",
+        ),
         (OTHER, ("stiffness.axial=1 %",), "+/-26 % at 145 Hz and 0.08 mm comes from the model error"),
     ],
 )

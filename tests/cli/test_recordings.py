@@ -105,7 +105,7 @@ SPOILED: list[tuple[str, Callable[[Path], object], tuple[str, ...]]] = [
     ("scalars.mat", lambda file: savemat(file, {"a": 1.0, "b": "text"}), ("holds no channels", "table2struct")),
     ("modes.unv", lambda file: pyuff.UFF(str(file)).write_sets([MILLIMETRES], "overwrite"), ("dataset 58",)),
     ("bomb.mat", bomb, ("cannot be read", "it unpacks to 1099511627776 values")),
-    *((f"cut.{ending}", cut(ending), ("file cannot be read", "cut short")) for ending in recordings.WRITERS),
+    *((f"cut.{ending}", cut(ending), ("file cannot be read", "incomplete")) for ending in recordings.WRITERS),
 ]  # fmt: skip
 
 

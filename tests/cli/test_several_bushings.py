@@ -140,7 +140,7 @@ def test_a_batch_of_several_bushings_has_their_columns_files_and_limits(shapes, 
 @pytest.mark.parametrize(
     ("at", "problem"),
     [
-        ("axial 25 Hz 0.1 mm", 'operating point is of several places; found: axial 25 Hz 0.1 mm; expected: "short'),
+        ("axial 25 Hz 0.1 mm", 'several places fit this operating point; found: axial 25 Hz 0.1 mm; expected: "short'),
         ("lung axial 25 Hz 0.1 mm", "no such direction or specimen; found: lung axial"),
     ],
 )
@@ -152,7 +152,7 @@ def test_an_operating_point_is_of_one_bushing(root, tmp_path, at, problem):
 @pytest.mark.parametrize(
     ("old", "new", "problem"),
     [
-        ('bushing = "long"\n', "", "long.csv: a test of no bushing of the campaign"),
+        ('bushing = "long"\n', "", "long.csv: the test names no bushing of the campaign"),
         ('bushing = "long"\n', 'bushing = "lang"\n', "found: lang"),
         ('"thick"', '"long axial"', "two bodies have one name"),
     ],

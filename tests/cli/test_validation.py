@@ -59,7 +59,7 @@ def test_simulated_motions_have_the_stated_spectra(campaign):
 
 def test_run_compares_measured_and_predicted_force(campaign, bushfit, tmp_path):
     done = bushfit("run", campaign, "-o", tmp_path / "run")
-    assert "validation records, never fitted" in done.stderr
+    assert "validation records (never fitted)" in done.stderr
     table = pd.read_csv(tmp_path / "run/validation.csv")
     assert table["test"].tolist() == [f"record_axial_{number}" for number in (1, 2, 3)]
     assert (table["NRMSE [%]"] < 0.6).all()
@@ -94,7 +94,7 @@ def test_a_gain_of_the_force_is_visible(campaign, bushfit, tmp_path):
     table["force [N]"] *= 1.1
     table.to_csv(tmp_path / "record_axial_1.csv", index=False)
     done = bushfit("diagnose", tmp_path / "campaign.toml", "-o", tmp_path / "out", "--no-plots")
-    assert "never fitted: predicted compared with measured force" in done.stderr
+    assert "(never fitted): predicted force compared with measured force" in done.stderr
     found = pd.read_csv(tmp_path / "out/validation.csv")
     assert found["peak gap [%]"][0] == pytest.approx(100.0 - 100.0 / 1.1, abs=1.5)
     assert found["energy gap [%]"][0] == pytest.approx(100.0 - 100.0 / 1.1, abs=3.0)
@@ -134,7 +134,7 @@ def test_a_low_pass_and_corrections_of_a_record_are_stated(campaign, bushfit, tm
     ("old", "new", "problem"),
     [
         ('rms = "0.05 mm", ', "", "these keys do not describe a motion"),
-        ('["2 Hz", "60 Hz"]', '["60 Hz", "2 Hz"]', "these frequencies are not a band"),
+        ('["2 Hz", "60 Hz"]', '["60 Hz", "2 Hz"]', "this is not a frequency band"),
         ('duration = "3 s"', 'duration = "3000 s"', "too long to simulate"),
     ],
 )

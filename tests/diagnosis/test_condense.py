@@ -77,7 +77,7 @@ def test_of_very_many_levels_some_are_diagnosed_and_none_forgotten():
     data = data_of(grid(levels))
     banded, said = shorten_tests(data)
     sweep = banded.sweeps[0].sweep
-    assert said == ("silent: 40 of its 300 runs at one level, or frequency, are used in the diagnosis, evenly spread",)
+    assert said == ("silent: the diagnosis uses 40 of 300 runs at one level or frequency, evenly spread",)
     assert sweep.frequency.size == 160
     assert {sweep.amplitude.min(), sweep.amplitude.max()} == {levels.min(), levels.max()}
     assert np.abs(off(sweep)).max() < 1e-12
@@ -141,7 +141,7 @@ def test_of_very_many_rows_of_loops_each_loop_once_is_diagnosed_before_any_is_re
     fewer, said = shorten_tests(data)
     assert "".join(each.name for each in fewer.loops) == kept
     assert len(said) == (len(kept) < 6)
-    assert all(f"{len(kept)} of the 6 loops are used in the diagnosis" in words for words in said)
+    assert all(f"the diagnosis uses {len(kept)} of the 6 loops" in words for words in said)
     assert fewer.sweeps == data.sweeps
     whole = sum(made[int(name)][1] == 1.0 and made[int(name)][2] == 0 for name in kept)
     assert fewer.loops[0].gain_error == pytest.approx(0.01 * np.sqrt(whole))

@@ -79,7 +79,7 @@ def test_kilonewtons_taken_for_newtons_in_all_tests_are_told(levelled):
     sweeps = tuple(stiffer(sweep, 1e-3) for sweep in without(levelled, Direction.RADIAL))
     loops = tuple(replace(loop, force=1e-3 * loop.force) for loop in levelled.loops)
     (told,) = [line for line in joint_fit(replace(levelled, sweeps=sweeps, loops=loops)).warnings if "units" in line]
-    assert "kPa is that of no rubber" in told
+    assert "kPa is impossible for rubber" in told
 
 
 def test_what_wrong_weights_cost_is_that_of_a_mean_of_two_groups(paper_model):

@@ -228,7 +228,7 @@ def test_static_curves_and_comparisons_are_about_a_preload():
     (contrast,) = compared.comparisons[0].contrasts
     assert contrast.reference.preload == contrast.other.preload == preload
     assert "axial at a preload of 700 N: stiffness" in compared.words[0]
-    with pytest.raises(ModelError, match="outside of the tests"):
+    with pytest.raises(ModelError, match="outside the tested range"):
         compare(result, result, preload="1100 N")
 
 

@@ -115,8 +115,8 @@ LOOP_FAULTS: dict[str, Callable[[Loop], Loop]] = {
     "the force has an outlier at data row 701": lambda x: jumping(x, 700),
     " and 1 more": lambda x: jumping(x, 100, 700, 1300, 1900),
     "1 gap in time, the first after data row 300: 0.31 s without a row": lambda x: less(x, slice(300, 330)),
-    "30 rows from data row 401 on repeat one displacement and force": stuck,
-    "before its steady cycles are left out": lambda x: replace(
+    "30 rows from data row 401 on repeat the same displacement and force": stuck,
+    "before the steady cycles are left out": lambda x: replace(
         x, displacement=x.displacement * np.where(x.time < 9.9, 0.6, 1.0)
     ),
     "the mean displacement is 0.03 mm, 3 % of its amplitude": lambda x: replace(x, displacement=x.displacement + 3e-5),
@@ -203,7 +203,7 @@ def test_repeats_that_nothing_tells_are_asked_for(sweep, tmp_path):
     table["amplitude [mm]"] *= 1.0 + 0.12 * np.random.default_rng(1).uniform(-1.0, 1.0, len(table))
     table.sample(frac=1.0, random_state=1).to_csv(tmp_path / "axial.csv", index=False)
     odd = inspect_file(tmp_path / "axial.csv", {}).odd
-    assert any("if they are repeats, number them in a column repeat" in sentence for sentence in odd)
+    assert any("if the levels are repeats, number the repeats in a column repeat" in sentence for sentence in odd)
 
 
 @pytest.mark.parametrize(
@@ -354,7 +354,7 @@ def test_a_programme_of_loops_is_described(paper_model, tmp_path, *, timed):
     assert seen.kind == "loop"
     assert seen.facts["programme"] == said
     assert seen.facts["loop 2"].startswith("0.5 mm at 0.1 Hz, a sine; ")
-    assert seen.facts["loop 2"].endswith("before its steady cycles are left out; 4 cycles are used")
+    assert seen.facts["loop 2"].endswith("before the steady cycles are left out; 4 cycles are used")
     seen = look(tmp_path, replace(record, displacement=1e3 * record.displacement))
     assert any(sentence.startswith("amplitude of 200 to 1000 m") for sentence in seen.odd)
     assert tomllib.loads("\n".join(campaign_tables([seen], tmp_path)))["loops"][0]["file"] == "axial.csv"

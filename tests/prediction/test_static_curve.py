@@ -113,7 +113,7 @@ def test_the_rate_is_stated_or_that_of_the_slowest_loop(paper_model):
 
 
 def test_a_law_of_the_harmonic_alone_has_no_curve_unless_it_is_the_rigs(paper_model):
-    with pytest.raises(ModelError, match="hysteretic_loss: this needs a law in time"):
+    with pytest.raises(ModelError, match="hysteretic_loss: an effect of the model has no law in time"):
         static_curve(Result(paper_model.with_effect("hysteretic_loss")), Direction.AXIAL, 1e-3, RATE)
     rigged = paper_model.with_effect("rig_compliance", {"rig_compliance.compliance": 1e-7})
     kept, plain = (static_curve(Result(model), Direction.AXIAL, 1e-3, RATE) for model in (rigged, paper_model))

@@ -255,7 +255,7 @@ INSTRUMENT_EXPORTS: dict[str, Export] = {
     ),
     "rows that repeat": Export(
         loop("time [s]|displacement [mm]|force [N]", *np.repeat([TIME, DISPLACEMENT, FORCE], [1 + (n == 200) for n in range(600)], axis=1)), "loop",
-        ["1 row that repeats"],
+        ["1 row that equals"],
     ),
     "means and deviations of parts": Export(
         sweep("Frekvens (Hz)|Amplitud (mm)|Styvhet medel (N/mm)|Styvhet std (N/mm)|Förlustfaktor medel|Förlustfaktor std", F, A, K, 0 * F + 20, ETA, 0 * F + 0.004)
@@ -275,7 +275,7 @@ INSTRUMENT_EXPORTS: dict[str, Export] = {
         "2 bushings in parallel\n" + blocks("Amplitude: {} mm".format, "f [Hz]|K* [N/mm]|tan delta"), words=["line 1 is not understood"]
     ),
     "a force of noise": Export(
-        loop("time [s]|displacement [mm]|force [N]", TIME, DISPLACEMENT, NOISE), "loop", ["the record is no steady loop"], reference={"force": NOISE}
+        loop("time [s]|displacement [mm]|force [N]", TIME, DISPLACEMENT, NOISE), "loop", ["the record is not a steady loop"], reference={"force": NOISE}
     ),
     "a row for each quantity": Export("".join(
         f"Amplituda drgań (0–szczyt);{a};mm\n" + "".join(

@@ -137,12 +137,12 @@ def test_the_temperature_of_a_file_is_its_condition_if_it_has_a_unit(unit, value
 #: What is wrong, what is stated, and what the error says besides what tests/cli/spoiled_tables.py has.
 BAD_SWEEPS: list[tuple[str, dict[str, Any], list[str]]] = [
     (ONE_FREQUENCY, {}, ["line 1", "no column for the frequency", 'at_frequency = "10 Hz"']),
-    (SWEEP, {"at_amplitude": 1e-4}, ["line 6", '"amplitude [mm]"', '"0.2"', "0.1 mm, within 10 %", "take at_amp"]),
-    (SWEEP, {"at_frequency": 5.0}, ["line 3", "frequency is not the one", "5 Hz", "at_frequency"]),
+    (SWEEP, {"at_amplitude": 1e-4}, ["line 6", '"amplitude [mm]"', '"0.2"', "0.1 mm, within 10 %", "remove at_amp"]),
+    (SWEEP, {"at_frequency": 5.0}, ["line 3", "the frequency in the file differs", "5 Hz", "at_frequency"]),
     (
         at_temperatures(-10.0, 18.4),
         {"temperature": 313.15},
-        ["near the temperature", "-10.0, 18.4 degC", "2 K of 40 degC", 'temperature = "18.4 degC"'],
+        ["near the stated temperature", "-10.0, 18.4 degC", "2 K of 40 degC", 'temperature = "18.4 degC"'],
     ),
     (SWEEP, {"direction": DMA}, ["line 1", "test of displacement and force or stiffness", 'kind = "shear"']),
     (COUPON.replace("_dyn_pct", ""), {"direction": DMA}, ["line 1", "the amplitude has no unit", 'write "strain [%]"']),

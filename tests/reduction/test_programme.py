@@ -92,8 +92,8 @@ def test_each_steady_part_is_a_loop_in_its_order(paper_model, case):
     assert used is None or [prepared.cycles for prepared in prepared_loops] == pytest.approx(used, abs=0.2)
     if case == "pauses":
         sentences = [loop.part.left_out for loop in loops if loop.part and loop.part.left_out]
-        assert [sentence.count("before its steady cycles") for sentence in sentences] == [1, 1, 1]
-        assert [sentence.count("4.99 s after its steady cycles") for sentence in sentences] == [0, 0, 1]
+        assert [sentence.count("before the steady cycles") for sentence in sentences] == [1, 1, 1]
+        assert [sentence.count("4.99 s after the steady cycles") for sentence in sentences] == [0, 0, 1]
     for loop in loops:
         rows = slice(loop.part.first_row, loop.part.first_row + loop.force.size)
         np.testing.assert_array_equal(loop.force, record.force[rows])

@@ -167,7 +167,7 @@ def read_results(folder: Path) -> list[ResultFile]:
     """
     if not folder.is_dir():
         kind = "a file" if folder.exists() else "nothing"
-        raise ModelError("a folder of results is needed", file=folder, found=kind, expected="as bushfit run writes it")
+        raise ModelError("a folder of results is needed", file=folder, found=kind, expected="a folder of bushfit run")
     if not any((folder / f"{name}.json").exists() for name in MODELS):
         present = sorted(path.name for path in folder.iterdir())[:8]
         raise ModelError(
@@ -175,7 +175,7 @@ def read_results(folder: Path) -> list[ResultFile]:
             file=folder,
             found=", ".join(present) or "nothing",
             expected=" or ".join(f"{name}.json" for name in MODELS),
-            hint=f"bushfit run CAMPAIGN -o {folder} writes one",
+            hint=f"bushfit run CAMPAIGN -o {folder} writes a model",
         )
     paths = {name: folder / f"{name}.json" for name in (*MODELS, JOINT, "diagnosis")}
     documents = {name: read_document(path) for name, path in paths.items() if path.exists()}
@@ -222,8 +222,8 @@ def read_table(folder: Path, name: str) -> pd.DataFrame | None:
         return table
     except (ValueError, KeyError, BadZipFile) as error:
         raise ModelError(
-            "this table is not as bushfit writes it",
+            "this table does not have the format that bushfit writes",
             file=file,
             found=str(error),
-            hint="write the results again, or remove the file: the page then omits it",
+            hint="write the results again, or remove the file: the page then omits the table",
         ) from error

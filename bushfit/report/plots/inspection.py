@@ -254,8 +254,7 @@ def resonance_figure(resonance: Resonance, title: str) -> style.Chart:
     ratio.annotate(f"{frequency:.1f} Hz", (frequency, largest), (4, 0), textcoords="offset points", **style.WORDS)
     hidden = f"Points with an error of |K| beyond {100 * LARGEST_ERROR:g} % are not drawn."
     return figure.explain(
-        "Grey line: measured transmissibility (acceleration of the mass divided by that of the base).",
-        "Points: means of neighbouring rows of the file.",
+        "Grey line: transmissibility (acceleration of mass divided by base). Points: means of neighbouring rows.",
         "Bars: twice the standard error; the error is large where mass and base move almost equally.",
         hidden * bool(resonance.left_out.size),
     )

@@ -296,7 +296,7 @@ SPOILED: dict[str, list[tuple[Spoil, tuple[str, ...]]]] = {
                 ('time [s],force [N],"force [N], low","force [N], high"', "displacement before force [N]"),
             )
         ),
-        (written("axial.csv", "frequency [Hz],amplitude [mm]\nx,1\n"), ("axial.csv: this table is not as", "'x'")),
+        (written("axial.csv", "frequency [Hz],amplitude [mm]\nx,1\n"), ("axial.csv: this table does not", "'x'")),
         (written("axial.csv", ""), ("axial.csv: the file is empty",)),
         (lambda folder: (folder / "axial.csv").write_bytes(b"\xff\xfe\x00"), ("axial.csv", "not UTF-8")),
     ],
@@ -307,7 +307,7 @@ SPOILED: dict[str, list[tuple[Spoil, tuple[str, ...]]]] = {
         (written("compare.html", "mine"), ("that bushfit did not write", "compare.html")),
     ],
     "batch": [
-        (written("batch.json", '{"schema": "x"}'), ("not a batch this version reads",)),
+        (written("batch.json", '{"schema": "x"}'), ("this version cannot read the file as a batch",)),
         (without("batch.json"), ("there is no model in this folder",)),
         (changed("batch.json", quantities={"a [-]": {"median": 1.0}}), ("quantities.a [-].", "a key is missing")),
     ],
