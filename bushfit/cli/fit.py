@@ -133,7 +133,7 @@ def _print_and_write(
             action = action if result.fitted else f"free a parameter in [fit] of {file}, and fit again"
     if fitted.files[0].name == "static":
         action = f"bushfit fit-dynamic {file} --static {written} fits m and alpha"
-    elif units := next((line for line in result.warnings if re.search("no rubber.*units", line)), ""):
+    elif units := next((line for line in result.warnings if re.search("impossible for rubber.*units", line)), ""):
         verdict, action = units, f"bushfit diagnose {file} finds the file with the wrong unit"
     elif left_open := result.covariance.describe_unknown(result.model.values):
         verdict, action = left_open, f"bushfit plan {file} --hours 1 chooses tests that determine them"
