@@ -21,7 +21,7 @@ from bushfit.units import CELSIUS, format_range, number
 
 #: Largest relative distance beyond the fitted range that is no extrapolation: rigs miss their set points by less.
 MARGIN = 0.01
-#: End of the warning of a prediction outside of the tests.
+#: End of the warning of a prediction outside the tested range.
 BEYOND = "extrapolated outside this range"
 #: Relative decrease of the radial stiffness by a finite bulk modulus above which a warning is due: as large as the
 #: other errors.

@@ -151,10 +151,10 @@ def test_a_time_that_does_not_go_with_the_rows_is_told_by_every_fit(typed, tests
     for stated, said in (("--rate=0.4 mm/s", 1), ("--frequency=0.1 Hz", 0)):
         waveform = () if said else ("--waveform", "sine")
         started = typed("init", *tests, *GEOMETRY, stated, *waveform, "-o", "campaign", "--force")
-        assert started.stderr.count("like those of a sine recorded evenly") == said
+        assert started.stderr.count("as for a sine recorded evenly") == said
         for command in ("fit-static", "fit"):
             done = typed(command, "campaign/campaign.toml", "-o", "out", "--no-plots", "--force")
-            words = "warning: loop_axial_1: 29 % of the rows lie beyond 0.9 of the amplitude, like those of a sine"
+            words = "warning: loop_axial_1: 29 % of the rows lie beyond 0.9 of the amplitude, as for a sine"
             assert done.stderr.count(words) == said
             (written,) = (tmp_path / "out").glob("[sm]*.json")
             assert sum("rate means a triangle" in line for line in document(written)["warnings"]) == said

@@ -200,7 +200,7 @@ def test_only_tested_preloads_are_predicted_also_from_the_model_file():
     assert default.preload == Preload(300.0, "N")
     assert default.stiffness.value == stated.stiffness.value
     refused = {
-        "outside of the tests": (Direction.AXIAL, Preload(0.0, "N")),
+        "outside the tested range": (Direction.AXIAL, Preload(0.0, "N")),
         "another quantity": (Direction.AXIAL, Preload(1e-4, "m")),
         "not fitted to several preloads": (Direction.RADIAL, Preload(500.0, "N")),
     }

@@ -143,7 +143,7 @@ def test_ranges_beyond_the_tests_are_stated(paper_model):
     # |sin| > 0.2 in 87.2 % of a cycle; the rate 0.15 m/s exceeds 2 pi 20 Hz 0.5 mm = 0.0628 m/s in 72.5 %
     assert large.shares_beyond == pytest.approx((0.872, 0.725), abs=0.005)
     assert large.warnings[0].startswith("axial: predicted at strains of")
-    assert large.warnings[1].startswith("axial: strain rates of up to 9.24 1/s")
+    assert large.warnings[1].startswith("axial: strain rates up to 9.24 1/s")
     coarse = time_response(result, Direction.AXIAL, History.sampled(4e-4 * np.sin(30.0 * TIME[::20]), 20 * STEP))
     assert coarse.warnings[0].startswith("axial: the history has 11 samples in a mean cycle")
 
