@@ -225,7 +225,10 @@ def test_a_rig_without_limits_and_an_error_of_the_model_are_told(root):
 
 
 def test_simulated_campaigns_show_the_errors_promised(known):
-    """Twenty campaigns tell a standard error within a third; the page quotes 300. Nothing is known before the tests."""
+    """Twenty campaigns tell a standard error within a third; the page quotes 300. Nothing is known before the tests.
+
+    A plan promises the errors of a model that meets its tests. A fit that reports a misfit weights the tests otherwise.
+    """
     truth, names = known.model, known.names
     vague = replace(known, covariance=100.0 * known.covariance, noise=Noise())
     planned = plan(vague, PlanRequest("predictions", 0.7, RIG, (AXIAL,), (WANTED,), names))
@@ -234,10 +237,12 @@ def test_simulated_campaigns_show_the_errors_promised(known):
     found = []
     for seed in range(20):
         campaign = replace(measure(clean, replace(settings, seed=seed)).campaign(), rig=RIG)
-        fitted = joint_fit(campaign, directions=["axial"]).model
-        found.append([fitted.values[name] / truth.values[name] - 1.0 for name in names])
+        fitted = joint_fit(campaign, directions=["axial"])
+        if not fitted.model_error:
+            found.append([fitted.model.values[name] / truth.values[name] - 1.0 for name in names])
     promised = [planned.document["parameters"][name]["planned"] for name in names]
     ratio = np.sqrt(np.mean(np.square(found), axis=0)) / promised
+    assert len(found) >= 17
     assert np.all((ratio > 0.6) & (ratio < 1.45))
 
 
