@@ -142,7 +142,7 @@ def _print_gap(output: Output, document: Mapping[str, Any], changed: bool) -> No
     )
     output.print_table(title, ("", "before", "after"), rows)
     if usable:
-        how = "of the points, each left out of the fit in turn" if usable["held_out"] else "of the fitted points"
+        how = "of the points, each predicted by a fit without it" if usable["held_out"] else "of the fitted points"
         error = f"{number(100 * usable['stiffness'], 2)} % in stiffness and {number(usable['loss_factor'], 2)}"
         console.print(f"  expected error {error} in loss factor (95 % {how})")
     if output.verbose:

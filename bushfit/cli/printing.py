@@ -97,7 +97,7 @@ def print_tests(output: Output, misfits: Sequence[Misfit], usable: Sequence[Expe
     if count := len(tests) - len(worst):
         output.print(f"and {count} more {'test has' if count == 1 else 'tests have'} a smaller misfit; -v lists them")
     for place in usable:
-        how = "each left out of the fit in turn" if place.held_out else "all fitted"
+        how = "each predicted by a fit without it" if place.held_out else "all fitted"
         error = f"{number(100 * place.stiffness, 2)} % in stiffness and {number(place.loss_factor, 2)} in loss factor"
         output.print(f"{place.place}: expected error {error} (95 % of {place.points} points, {how})")
 

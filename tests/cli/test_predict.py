@@ -73,7 +73,7 @@ def test_predict_lays_measurements_over_takes_grids_and_shows_at_most_eight_ampl
     assert dict(zip(measured["direction"], measured["fitted"], strict=True)) == {"axial": "yes", "radial": "no"}
     assert measured["measured over model [-]"].between(0.95, 1.05).all()
     axial, radial = (line for line in done.stderr.splitlines() if ": expected error " in line)
-    assert (axial.endswith("all fitted)"), radial.endswith("each left out of the fit in turn)")) == (True, True)
+    assert (axial.endswith("all fitted)"), radial.endswith("each predicted by a fit without it)")) == (True, True)
     table = pd.read_csv(tmp_path / "x" / "axial.csv")
     assert table["frequency [Hz]"].tolist() == [10, 20, 30] * 2
     assert table["amplitude [mm]"].tolist() == [0.1] * 3 + [0.3] * 3
