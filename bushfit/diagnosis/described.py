@@ -105,10 +105,11 @@ def describe(
     model = replace(fitted.model, effects=(*evidence.model.effects, NAME), unnamed=correction)
     after = Evidence(fitted.reevaluate(model, harmonic))
     whole = Evidence(fitted.reevaluate(model, evidence.data_sets))
-    holdout = _hold_out_inside(evidence, fitted)
-    if has_candidates and (holdout.after or 0.0) >= (holdout.before or np.inf):
-        return None
-    holdout = _hold_out_inside(before, fitted) if before else holdout
+    if has_candidates:
+        beside_effects = _hold_out_inside(evidence, fitted)
+        if (beside_effects.after or 0.0) >= (beside_effects.before or np.inf):
+            return None
+    holdout = _hold_out_inside(before or evidence, fitted)
     return GapDescription(after, fitted, holdout, law, sentence, _validity(correction, whole))
 
 
