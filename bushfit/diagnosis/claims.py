@@ -1,8 +1,8 @@
 """Mistakes in the record of a campaign (wrong units, conventions, dimensions), and the misfit without them.
 
-A claim is the hypothesis of one mistake. A mistake has no free parameter, so it costs only the logarithm of the number
-of mistakes considered. It has to close the whole gap, and to be more probable than every effect and every fault. The
-user decides whether to correct it.
+A claim is the hypothesis that one mistake was made. A mistake has no free parameter, so its only penalty is the
+logarithm of the number of mistakes considered. A mistake is reported if its correction closes the whole gap and if it
+is more probable than every effect and every fault. The user decides whether to correct it.
 """
 
 from __future__ import annotations
@@ -91,7 +91,7 @@ class Claim:
         )
 
     def corrected(self) -> PreparedCampaign:
-        """Correct the mistake, in the tests or in the dimensions of the bushing.
+        """Campaign in which this mistake is corrected, in the tests or in the dimensions of the bushing.
 
         Returns:
             The corrected campaign.
@@ -143,7 +143,7 @@ def correct_adopted(data: PreparedCampaign, names: Collection[str]) -> tuple[Pre
 
 
 def claims(data: PreparedCampaign, without: Collection[str]) -> list[Claim]:
-    """List the hypotheses of one mistake in the record: in one test, in all of a kind or direction, or in all tests.
+    """List the possible mistakes in the record: each in one test, in all tests of a kind or direction, or in all tests.
 
     Args:
         data: the campaign as it was read.
@@ -235,7 +235,7 @@ class ClaimScreening:
     def _test_products(
         self, index: int, data_set: MeasuredTest, mistake: Mistake | None, bushing: Bushing | None
     ) -> Array:
-        """Inner products of the stiffness per unit of mu, m and sigma_fmax and the measured stiffness of one test.
+        """Inner products of the stiffness per unit of mu, m and sigma_fmax with the measured stiffness of one test.
 
         Args:
             index: index of the test, loops before sweeps.

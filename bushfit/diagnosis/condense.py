@@ -1,4 +1,4 @@
-"""Shorter tests for a diagnosis: long sweeps averaged over narrow bands, very many levels or loops thinned out.
+"""Shorten tests for a diagnosis: average long sweeps over narrow bands, and select some of very many levels or loops.
 
 A level is the set of all points of a sweep at one constant amplitude, or at one constant frequency.
 """
@@ -32,7 +32,7 @@ class _ShortSweep(NamedTuple):
 
     Args:
         sweep: means over narrow bands, or the selected points.
-        conditions: temperature and earlier strains at these points, which include those of points that are left out.
+        conditions: temperature and largest earlier strains at these points; points that are left out count as earlier.
         noise_ratios: variance of the noise of a mean relative to that of one point, for each averaged level.
         sentence: sentence on the reduction, for the user.
     """
@@ -103,7 +103,7 @@ def _select_loops(loops: Sequence[MeasuredLoop]) -> Sequence[MeasuredLoop]:
 
 
 def _new_noise(before: SweepNoise, shortened: Sequence[_ShortSweep], rig: RigSettings) -> SweepNoise:
-    """Noise of the sweeps of a rig after some were shortened; a stated noise falls with the number of points per mean.
+    """Noise of the sweeps after some were shortened; a stated noise falls with the number of points per mean.
 
     Args:
         before: noise of the sweeps as measured.

@@ -35,7 +35,7 @@ class GapDescription:
         after: model with its smooth correction of the stiffness, and the tests with loops replaced by their first
             harmonic.
         fitted: fit of the parameters with the correction treated as a random error of the model.
-        holdout: root mean square residuals of predicted runs inside the tested range, without and with the correction.
+        holdout: root mean square residuals of held-out runs inside the tested range, without and with the correction.
         power_law: nearest power law of frequency and amplitude; None if the tests show no power law.
         sentence: text on the size and the form of the gap, for the summary.
         evidence: text on the range of tests in which the correction is valid.
@@ -73,10 +73,10 @@ def describe(
     Args:
         evidence: the fitted model and the tests.
         rig: stated accuracy class of the rig (gain and phase errors).
-        start: starting values read from the data, for a model whose parameters the gap has distorted.
+        start: starting values estimated from the data, because the gap distorts the fitted parameters.
         bounds: limits of parameters inside their general limits.
-        before: fit of the starting model, to compare held-out residuals with; None for `evidence`.
-        has_candidates: True if known effects explain the gap, so that it is certain and has their form.
+        before: fit whose held-out residuals are compared with those of the correction; None for `evidence`.
+        has_candidates: True if known effects explain the gap, so that the gap is certain and its form is known.
 
     Returns:
         The description; None without a valid correction: if it does not raise the likelihood (with candidates: does not
@@ -149,7 +149,7 @@ def _hold_out_inside(before: Evidence, fitted: FitResult) -> HoldOut:
 
 
 def _validity(correction: Unnamed, whole: Evidence) -> str:
-    """Text on the tested range in which the correction is valid, and on the remaining misfit of the worst loop."""
+    """Sentence on the tested range in which the correction is valid, and on the remaining misfit of the worst loop."""
 
     def span(values: Sequence[float], factor: float = 1.0) -> str:
         return " to ".join(number(factor * end, 2) for end in (min(values), max(values)))

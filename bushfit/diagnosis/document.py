@@ -89,7 +89,7 @@ MisfitRegionEntry.__doc__ = "One region in which model and measurement disagree.
 
 
 class BeforeAfter(TypedDict):
-    """Root mean square residual in units of noise, before and after the additions; 1 is noise alone.
+    """Root mean square residual in units of noise, before and after effects are added; 1 is noise alone.
 
     Args:
         before: root mean square residual of the starting model.
@@ -196,7 +196,7 @@ class DiagnosisFile(TypedDict):
         summary: verdict as a sentence.
         nothing: probability that nothing is missing beyond noise and tolerance.
         odds: possible explanations, the most probable first; the rest to 1 belongs to explanations that are not listed.
-        effects: effects that were added, or those of the most probable explanation if none was.
+        effects: effects that were added to the model; if none was added, the effects of the most probable explanation.
         where: regions in which the starting model and the tests disagree.
         remainder: regions in which the final model and the tests disagree.
         description: power law nearest to a gap that no known effect explains; null without such a gap.

@@ -36,7 +36,7 @@ class Evidence:
 
     Args:
         solution: fit with residuals in units of noise.
-        joint: same fit with residuals whitened by errors that all tests share; None if it was fitted without them.
+        joint: same fit, whitened also by errors that all tests share; None if the fit has no such errors.
     """
 
     solution: FitResult
@@ -90,7 +90,7 @@ class Evidence:
         return [name for name in self.model.values if name not in self.solution.coordinates.names]
 
     def covariance_of(self, names: Collection[str]) -> Covariance:
-        """Covariance of named parameters, from the fit with errors that tests share, if there is one."""
+        """Covariance of the named parameters, from the fit with errors that tests share if this exists."""
         fitted = self.joint or self.solution
         full = np.linalg.pinv(fitted.jacobian @ fitted.jacobian.T, rcond=1e-12, hermitian=True)
         full *= max(fitted.chi_square / max(fitted.residual.size - len(full), 1), 1.0)  # what the fit misses
@@ -106,7 +106,7 @@ class Evidence:
 
     @cached_property
     def residual_rows(self) -> Mapping[MeasuredTest, slice]:
-        """Slice that the residuals of each test have in the vector of the residuals of all tests."""
+        """Slice of each test's residuals in the vector of the residuals of all tests."""
         ends = np.cumsum([data_set.size for data_set in self.data_sets]).tolist()
         return {data_set: slice(end - data_set.size, end) for end, data_set in zip(ends, self.data_sets, strict=True)}
 
@@ -148,7 +148,7 @@ def result_of(
         bounds: limits of parameters inside their general limits.
         resolved: names of effects known to belong to the bushing and not to the rig; the model's other effects with a
             twin in the rig are reported as unresolved.
-        lacking: False if the tests contain a mistake in their record, so that no error of the model is estimated.
+        lacking: False if the record of the tests has a mistake, so that no error of the model is estimated.
         corrected: fit together with a smooth correction of the model; None if the model has no correction.
         rig: stated accuracy class of the rig (gain and phase errors).
         fixed: covariance of parameters that the fit kept fixed; None if these are exact.
@@ -176,6 +176,6 @@ def result_of(
 
 
 def _with_levels(solution: FitResult, errors: LevelErrors) -> FitResult:
-    """Repeat a fit with errors that all runs of a level share in the noise."""
+    """Repeat a fit with noise that contains errors shared by all runs of a level."""
     tests = with_level_errors(solution.problem.tests, errors.error, errors.freedom)
     return Descent.start(replace(solution.problem, model=solution.model, tests=tests)).run(EVALUATIONS).solution

@@ -29,7 +29,7 @@ def label(composition: Composition) -> str:
 
 
 def _nameless(composition: Composition) -> list[str]:
-    """Texts for the parts of an explanation that are no known effect: level errors, and unknown smooth curves."""
+    """Texts for the parts of an explanation that are not known effects: level errors, and unnamed smooth curves."""
     return [LEVELS] * composition.best.levels + [NAMELESS] * composition.unnamed
 
 
@@ -77,7 +77,7 @@ def claim_entries(
 
 
 def undecided_text(reported: Sequence[Composition]) -> str:
-    """Sentence that lists explanations that the tests cannot distinguish, and what all of them contain."""
+    """Sentence that lists explanations that the tests cannot distinguish, and the parts that all of them contain."""
     parts = [label(composition).split(" + ") for composition in reported]
     shared = [name for name in parts[0] if all(name in names for names in parts)]
     *labels, last = (" + ".join(name for name in names if name not in shared) or "nothing else" for names in parts)
@@ -93,7 +93,8 @@ def causes_text(candidates: Sequence[Composition], finding: Finding) -> list[str
         finding: verdict, with all explanations and leads.
 
     Returns:
-        The candidates with their probabilities, and the leads that no candidate has; or the mistakes to check.
+        Sentences on the candidates with their probabilities and on leads (effects that reduce the gap without closing
+        it) that no candidate has; or on the mistakes to check.
     """
     claims = {c.best.claim.key if c.best.claim else None: c.best.claim for c in finding.reported}
     if all(claims.values()):
@@ -106,7 +107,7 @@ def causes_text(candidates: Sequence[Composition], finding: Finding) -> list[str
 
 
 def explanation_odds(finding: Finding) -> Odds:
-    """List the reported explanations with texts, probabilities and fitted models.
+    """Collect the text, probability and fitted model of each reported explanation.
 
     Returns:
         Explanations, the most probable first.
@@ -131,7 +132,7 @@ def explanation_odds(finding: Finding) -> Odds:
 def list_candidates(
     search: Search, hypotheses: Sequence[Hypothesis], first: Composition | None
 ) -> list[CandidateResult]:
-    """List all effects that the starting model lacks, and all mistakes that were fitted, with their results.
+    """List all effects that the starting model lacks, and all mistakes that were tried, each with its result.
 
     Args:
         search: completed search, with the tests.

@@ -74,8 +74,8 @@ class Explanation:
         family: name of the explanations that share a prior probability: an effect in all directions, or a kind of
             faulty part.
         name: name of the explanation.
-        group: changes of the residuals by the explanation; None for an effect that has to be refitted, because it
-            replaces a branch of the model.
+        group: changes of the residuals that the explanation would cause; None for an effect that replaces a branch of
+            the model and therefore needs a refit.
     """
 
     kind: str
@@ -111,7 +111,7 @@ class FaultyPart(Explanation):
         return self.group.whole
 
     def point_by_point(self) -> FaultyPart:
-        """Fault of the same points of sweeps with an independent error of each, in place of a common shift or slope.
+        """Fault of the same sweep points, each with an independent error in place of a common shift or slope.
 
         Returns:
             Faulty part with one column for each residual of its points.
@@ -123,7 +123,7 @@ class FaultyPart(Explanation):
         return replace(self, group=Group(columns, np.eye(rows.size), act_together=True))
 
     def distance(self, residual: Array) -> float:
-        """Root mean square deviation of the faulty points from the model, in units of noise.
+        """Root mean square deviation of this part's points from the model, in units of noise.
 
         Args:
             residual: whitened residuals of all tests, (n,).
@@ -135,12 +135,12 @@ class FaultyPart(Explanation):
 
 @dataclass(frozen=True, eq=False)
 class OutlierCluster(FaultyPart):
-    """Explanation of several outliers at one frequency, which were left out of the fit, by a disturbance there.
+    """Explanation of several outliers at one frequency, all left out of the fit, by a disturbance at that frequency.
 
     Args:
         outlier_distance: root mean square distance of the outliers from the model, in units of noise.
         size: largest distance of a point from the model, |K_model - K_measured|/|K_measured|.
-        log_odds: natural log of the odds of a disturbance, compared with single wrong rows that coincide by chance.
+        log_odds: natural log of the odds of a disturbance against a chance coincidence of single wrong rows.
     """
 
     outlier_distance: float
@@ -152,7 +152,7 @@ class OutlierCluster(FaultyPart):
 
 
 def is_pattern(faulty_parts: Sequence[FaultyPart]) -> bool:
-    """True if suspected faults of the tests form a pattern, which may be physics that the model lacks.
+    """True if suspected faults of the tests form a pattern, which may be an effect that the model lacks.
 
     Patterns are faults at several frequencies, as by a resonance, or at frequencies of all directions; at the smallest
     or largest level, as by a contact; or of two loops of one direction, rate and amplitude, which repeat each other.
@@ -174,7 +174,7 @@ def is_pattern(faulty_parts: Sequence[FaultyPart]) -> bool:
 def outlier_clusters(
     outliers: Sequence[Outlier], sweeps: Sequence[MeasuredSweep], model: Model
 ) -> list[OutlierCluster]:
-    """Find frequencies at which several outliers lie, as signs of a disturbance and not of single wrong rows.
+    """Find frequencies with several outliers, which suggest a disturbance rather than single wrong rows.
 
     Args:
         outliers: points that were left out.
@@ -221,7 +221,7 @@ def outlier_clusters(
 
 
 def compound(evidence: Evidence, count: int = _COMPOUND_PATTERNS, *, fast: bool = False) -> Group | None:
-    """Changes of the residuals by a compound whose modulus deviates smoothly from the model's laws.
+    """Changes of the residuals if the modulus of the compound deviates smoothly from the model's laws.
 
     The relative deviation is a random function of frequency and strain, the same in all directions and specimens.
 
@@ -248,11 +248,12 @@ def compound(evidence: Evidence, count: int = _COMPOUND_PATTERNS, *, fast: bool 
 
 
 def _strain_changes(evidence: Evidence) -> tuple[Array, Array]:
-    """Changes by an error of the strain in each of several directions or specimens, as `_smooth_changes` returns them.
+    """Changes due to an error of the effective strain in each direction or specimen, in the form of `_smooth_changes`.
 
     Returns:
-        Changes of the n whitened residuals, (d, n), and of the stiffness at all operating points, (d, points), by the
-        errors of d directions; d = 0 for one direction, whose strain the parameters of the compound define.
+        Changes of the n whitened residuals, (d, n), and of the stiffness at all operating points, (d, points), due to
+        the errors of d directions. With a single direction d is 0, because its strain only rescales the compound's
+        parameters.
     """
     model, tests = evidence.model, evidence.data_sets
     directions = list(dict.fromkeys(test.direction for test in tests))
@@ -271,7 +272,7 @@ def _strain_changes(evidence: Evidence) -> tuple[Array, Array]:
 
 
 def _fast_relaxation(evidence: Evidence) -> tuple[Array, Array]:
-    """Changes by relaxation that is faster than the tests, as `_smooth_changes` returns them, for one amount.
+    """Changes due to a relaxation faster than the tests, in the form of `_smooth_changes`, with one amount.
 
     Far below its own frequency, a relaxation is a loss modulus that grows as the frequency, like the phase of a delay.
     The amount is relative to the median modulus |K|/(stiffness per modulus) at the highest frequency.
@@ -289,7 +290,7 @@ def _fast_relaxation(evidence: Evidence) -> tuple[Array, Array]:
 
 
 def _compound_correlation(points: Array, nodes: Array) -> Array:
-    """Correlation of the compound's deviation at points, (n, 2), with that at nodes, (m, 2); (n, m).
+    """Correlation of the compound's deviation between n points, (n, 2), and m nodes, (m, 2), as a matrix (n, m).
 
     The columns are ln frequency and ln strain in units of the correlation lengths.
 
@@ -301,10 +302,10 @@ def _compound_correlation(points: Array, nodes: Array) -> Array:
 
 
 def compound_shapes(loop: MeasuredLoop) -> Array:
-    """Changes of the shape of a loop by a compound whose stiffness deviates from the model's laws by 100 %.
+    """Changes of the shape of a loop if the stiffness of the compound deviates from the model's laws by 100 %.
 
     Returns:
-        Changes of the loop's whitened residuals by c independent deviations of one standard deviation, (c, size).
+        Changes of the loop's n whitened residuals for c independent deviations, one standard deviation each, (c, n).
 
     Notes:
         An isotropic compound is symmetric, so a steady cycle has odd overtones only. The h-th falls as 1/h^2, because
@@ -324,7 +325,7 @@ def compound_shapes(loop: MeasuredLoop) -> Array:
 
 
 def unnamed_curves(evidence: Evidence) -> list[Explanation]:
-    """List smooth curves over frequency and strain, which explain a gap that no effect of the library explains.
+    """List smooth curves over frequency and strain that can explain a gap for which the library has no effect.
 
     A curve is a smooth complex relative change of the stiffness that all sweeps of one direction and temperature share.
 
@@ -379,8 +380,8 @@ def _smooth_changes(
         limits: limits of the number of patterns, passed to `gaussian_process.patterns`.
 
     Returns:
-        Changes of the n whitened residuals by q independent patterns in phase and in quadrature, (2 q, n), and the
-        complex relative changes of stiffness by these patterns at the points of `tests`, (2 q, points).
+        Changes of the n whitened residuals due to q independent patterns in phase and in quadrature, (2 q, n), and the
+        complex relative changes of stiffness of these patterns at the points of `tests`, (2 q, points).
     """
     model = evidence.model
     points = [coordinates(test.frequency, test.amplitude * model.unit_strain(test.direction)) for test in tests]
@@ -396,12 +397,12 @@ def _smooth_changes(
 def _repeat_changes(
     evidence: Evidence, loops: Sequence[MeasuredLoop], changes: Callable[[MeasuredLoop], Array]
 ) -> Array:
-    """Changes of all n residuals by force errors that repeats of a loop share.
+    """Changes of all n residuals due to force errors that repeats of a loop share.
 
     Args:
         evidence: fitted model and all tests.
         loops: repeats of a loop.
-        changes: function that returns the changes of the residuals of a loop by c force errors of unit amount, (c, m).
+        changes: function that returns the changes of a loop's m residuals due to c force errors of unit amount, (c, m).
 
     Returns:
         Changes of the residuals of all tests, (c, n).

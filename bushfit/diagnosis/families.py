@@ -1,4 +1,4 @@
-"""Model families on one campaign: the paper's model, and others that replace its branches, fitted and compared.
+"""Fit and compare model families on one campaign: the paper's model, and models that replace its branches.
 
 A family is a choice of effects for rate and for amplitude; each is fitted to all tests and predicts held-out tests.
 """
@@ -84,7 +84,7 @@ class FittedFamily:
 
 
 def known_families(model: Model, data_sets: Sequence[MeasuredTest]) -> tuple[str, ...]:
-    """List the model families that can replace a model: each effect of rate combined with each of amplitude.
+    """List the model families that can replace a model: each effect of rate combined with each effect of amplitude.
 
     The effect of temperature is added if the tests differ in temperature and the model has no such effect. The model
     itself, with the paper's branches unchanged, is left out.
@@ -185,7 +185,7 @@ def _log_evidence(chain: Sequence[Evidence], names: Sequence[str], bounds: Bound
     """Natural log of the marginal likelihood of the tests under a model family.
 
     Args:
-        chain: fits with no effect added, one effect, two effects, and so on; the last is that of the family.
+        chain: fits with no effect added, one effect, two effects, and so on; the last is the fit of the family.
         names: names of the added effects, in this order.
         bounds: limits of parameters inside their general limits.
     """
@@ -211,8 +211,9 @@ def _gain(
 
     Notes:
         By the delta method the variance of the gain is the sum, over the rows of all tests, of the squared derivative
-        by the noise of each row, times the smaller mean square, at least 1. A row that is not held out acts through the
-        parameters. Nonlinearity and estimated noise add to that, see `_BEYOND_LINEAR`.
+        by the noise of each row, times the smaller mean square, at least 1. A row that is not held out contributes
+        through the parameters. Nonlinearity and the estimated noise increase the variance further, see
+        `_BEYOND_LINEAR`.
     """
     disjoint, used_rows = list[Predicted](), np.zeros(sum(data_set.size for data_set in data_sets), dtype=bool)
     for part in hold_out_parts(data_sets):

@@ -1,4 +1,4 @@
-"""Faulty parts of the tests: a frequency, a level, a repeat, or a loop that disagrees with all others.
+"""Faulty parts of the tests: a frequency, a level, a repeat or a loop that disagrees with the rest of the tests.
 
 A level is the set of all points of a sweep at one constant amplitude, or at one constant frequency. A fault is an error
 of gain and phase that all points of the part have in common; levels and repeats also have a slope of both.
@@ -71,7 +71,7 @@ def _level_label(sweep: MeasuredSweep, point: int) -> str:
 
 
 def _levels(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> Iterator[FaultyPart]:
-    """Generate suspected faults: each level of a direction with several levels, each of three or more repeats."""
+    """Generate suspected faults: each level, if there are several, and each repeat of a level with three or more."""
     for sweep in sweeps:
         levels_of_direction = [np.unique(member.held_value) for member in sweeps if member.direction == sweep.direction]
         levels = np.concatenate(levels_of_direction)
@@ -153,7 +153,7 @@ def _common_fault(
     columns: Array | None = None,
     unit: Array = _SLOPING,
 ) -> FaultyPart:
-    """Build the explanation of a gap by common errors of sweep points: of gain and phase, and of their slopes.
+    """Explanation of a gap by errors that some sweep points share: of gain and phase, and of their slopes.
 
     Args:
         evidence: the fitted model and the tests.
@@ -178,7 +178,7 @@ def _common_fault(
 def _shift_columns(
     evidence: Evidence, sweeps: Sequence[MeasuredSweep], chosen: Sequence[Array], sloping: bool = False
 ) -> Array:
-    """Change of the whitened residuals of sweeps by an error of gain of 100 % and of phase of 1 rad.
+    """Change of the whitened residuals of sweeps due to a gain error of 100 % and a phase error of 1 rad.
 
     Args:
         evidence: the fitted model and the tests.
@@ -187,7 +187,8 @@ def _shift_columns(
         sloping: True to add the same errors times a slope along the log of the stepped quantity.
 
     Returns:
-        Changes of the residuals from the first to the last of `sweeps`, (2, rows), or (4, rows) with slopes.
+        Changes of the residuals of all rows from the first to the last of `sweeps`, (2, rows), or (4, rows) with
+        slopes.
     """
     rows = _row_span(evidence, sweeps)
     columns = np.zeros((2 + 2 * sloping, rows.stop - rows.start))

@@ -1,4 +1,4 @@
-"""Groups: changes of the residuals by one explanation of a gap, with a prior; and the evidence of tests for them."""
+"""Groups of residual changes that one explanation of a gap would cause, and the evidence of the tests for them."""
 
 from dataclasses import dataclass
 
@@ -12,7 +12,7 @@ _UNSEEN = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Group:
-    """Changes of the residuals by one explanation of a gap: c columns, with Gaussian priors of their amounts.
+    """Changes of the residuals that one explanation of a gap would cause: c columns with Gaussian amounts.
 
     Args:
         columns: change of the n whitened residuals per unit amount of each column, (c, n).
@@ -60,7 +60,7 @@ class GroupEvidence:
     Args:
         log_evidence: natural log of the marginal likelihood of the tests with the explanation, averaged over the sizes
             of its amounts and of the rig's errors.
-        size: relative change of |K| by the explanation, root mean square over the posterior.
+        size: relative change of |K| due to the explanation, root mean square over the posterior.
         likeliest: most probable prior standard deviation of the amounts, relative to |K|, one of `priors.SIZES`.
         with_compound: evidence for the explanation together with a smooth deviation of the rubber from the model's
             laws; None if no such deviation is considered.
@@ -73,7 +73,7 @@ class GroupEvidence:
 
     @property
     def total(self) -> float:
-        """Natural log of the marginal likelihood, summed over compounds that follow the model's laws or not."""
+        """Natural log of the marginal likelihood, summed over the cases with and without a deviation of the compound."""
         if self.with_compound is None:
             return self.log_evidence
         return float(np.logaddexp(self.log_evidence, self.with_compound.log_evidence))

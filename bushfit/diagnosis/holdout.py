@@ -1,4 +1,4 @@
-"""Hold-out: prediction of each part of the tests from the rest, with and without the added effects.
+"""Hold-out validation: predict each part of the tests from the other parts, with and without the added effects.
 
 A level (all points of the sweeps at one constant amplitude, or at one constant frequency), the top third of the stepped
 values, a direction and a loop are held out in turn.
@@ -196,8 +196,9 @@ class Predicted(NamedTuple):
     Args:
         residuals: for each model, the n residuals in units of noise, and whitened by the prediction error as well,
             (2, 2, n).
-        noise_gradients: for each model, the derivatives of half the sum of squares of the residuals in units of noise
-            by the noise of each of the m residuals of all tests, (2, m); for the standard error of a comparison.
+        noise_gradients: for each model, the derivatives of half the sum of squares of the residuals (in units of noise)
+            with respect to the noise of each of the m residuals of all tests, (2, m); for the standard error of a
+            comparison.
     """
 
     residuals: Array
@@ -205,7 +206,7 @@ class Predicted(NamedTuple):
 
 
 def _leave_out(solution: FitResult) -> LeaveOut:
-    """Linearise a fit to predict how it changes without some rows; parameters at a bound are fixed."""
+    """Linearise a fit, to predict it without some rows; parameters at a bound are fixed."""
     return LeaveOut.from_fit(solution.jacobian[solution.moving], solution.residual)
 
 
@@ -221,8 +222,9 @@ def _predict(
         bounds: limits of parameters, for a fit to the remaining tests.
 
     Returns:
-        Residuals, in units of noise and whitened by the prediction error as well, (2, n), and the derivatives of half
-        the sum of squares of the former by the noise of each of all m residuals, (m,); or why the part is skipped.
+        Residuals, in units of noise and whitened by the prediction error as well, (2, n), and derivatives of half the
+        sum of squares in units of noise with respect to the noise of each of the m residuals of all tests, (m,); or the
+        part with the reason why it is skipped.
     """
     solution, data_sets = evidence.solution, evidence.data_sets
     names, of_tests = solution.coordinates.names, part.rows(data_sets)
@@ -246,7 +248,7 @@ def _predict(
 
 
 def _clusters(data_sets: Sequence[MeasuredTest], count: int) -> Array:
-    """Index of the level or loop of each of the first of `count` residuals; the others, of priors, are alone."""
+    """Index of the level or loop that each of `count` residuals belongs to; residuals of priors have an index each."""
     numbers, first = list[Array](), 0
     for data_set in data_sets:
         level = np.zeros(data_set.size // data_set.residuals_per_point, dtype=int)

@@ -106,7 +106,7 @@ class Hypothesis:
 
     @property
     def refitted(self) -> bool:
-        """True if all effects were refitted, so that no evidence rests on a linear model alone."""
+        """True if all effects of the hypothesis were refitted; False if one was weighed in the linear model alone."""
         return self.last is None or self.last.kind != "effect"
 
     @property
@@ -176,7 +176,7 @@ class SearchState:
 
     @cached_property
     def key(self) -> frozenset[Hashable]:
-        """Names that identify this step of the search: effects, faulty parts of the tests, and corrected mistake."""
+        """Names that identify this search state: effects, faulty parts of the tests, and corrected mistake."""
         return self.hypotheses[0].key
 
     @cached_property
@@ -192,7 +192,7 @@ class SearchState:
 
     @property
     def log_posterior(self) -> float:
-        """Natural log of prior times evidence of these explanations, whether or not the compound deviates."""
+        """Natural log of prior times evidence of this state's explanations, with or without a compound deviation."""
         return self.log_weight + self.linear.evidence.total
 
     @cached_property
@@ -200,10 +200,10 @@ class SearchState:
         """Natural log of the prior probability of these explanations times the prior density of all parameters.
 
         Notes:
-            The prior of the rubber's parameters is uniform in what they change of the tests, in units of noise
-            (Jeffreys, 1946): density |J J^T|^(1/2), where J are the derivatives of the residuals. A density uniform in
-            the logarithms would reward fits in which a parameter has no influence, such as mu near zero. If an effect
-            replaces a branch, its best determined parameters count in place of those of the branch.
+            The prior of the rubber's parameters is uniform in the predicted tests, in units of noise (Jeffreys, 1946):
+            density |J J^T|^(1/2), where J are the derivatives of the residuals. A density uniform in the logarithms
+            would reward fits in which a parameter has no influence, such as mu near zero. If an effect replaces a
+            branch, its best determined parameters count in place of those of the branch.
         """
         solution, added = self.bare.solution, [get_effect(name) for name in self.effects]
         replacing = {qualified_name(e, parameter) for e in added if e.replaces for parameter in e.parameters}
@@ -214,12 +214,12 @@ class SearchState:
 
     @property
     def likeliest_deviation(self) -> float:
-        """Likeliest standard deviation of the compound's deviation, relative to |K|; 0 if none is more probable."""
+        """Likeliest standard deviation of the compound's deviation, relative to |K|; 0 if none is likelier."""
         plain, bent = self.linear.evidence, self.linear.evidence.with_compound
         return bent.likeliest if bent and bent.log_evidence > plain.log_evidence else 0.0
 
     def free_columns(self, deviation: float) -> Array | None:
-        """Changes of the residuals by faulty parts of the tests and the compound, left free in refits of effects.
+        """Changes of the residuals due to faulty parts of the tests and the compound, left free in refits of effects.
 
         Without these columns an effect would be fitted to the faults.
 
@@ -242,7 +242,7 @@ class SearchState:
     def parameters(self) -> tuple[dict[str, float], Covariance]:
         """Posterior means [SI] and covariance of the parameters inside their ranges.
 
-        They include what the rig's errors and a deviation of the compound in all its patterns could imitate.
+        The covariance includes errors of the rig and all patterns of a deviation of the compound.
         """
         solution, values = self.bare.solution, self.bare.model.values
         linear = replace(
@@ -259,7 +259,7 @@ class SearchState:
 
     @property
     def may_grow(self) -> bool:
-        """True if a further effect may be added."""
+        """True if the search may add a further effect to this state."""
         return len(self.effects) < self.tests.max_effects
 
     @cached_property
@@ -275,7 +275,7 @@ class SearchState:
         return list(zip(explanations, self.weigh(explanations), strict=True))
 
     def weigh(self, explanations: Sequence[Explanation]) -> list[GroupEvidence]:
-        """Compute the evidence of the tests for given explanations, averaged over likely sizes of the rig's errors.
+        """Evidence of the tests for given explanations, averaged over the likely sizes of the rig's errors.
 
         Args:
             explanations: effects, faulty parts or curves, each with its residual columns.
@@ -288,7 +288,7 @@ class SearchState:
 
     @cached_property
     def _likely_cases(self) -> Array:
-        """Indices of the combinations of rig errors that are likely, alone or together with a smooth curve."""
+        """Indices of the noise cases (sizes of rig errors) that are likely, alone or together with a smooth curve."""
         smooth = [e.group for e in self.tests.explanations if e.group and e.kind == "unnamed"]
         curves = replace(self.linear, groups=smooth, compound=None)
         return np.union1d(self.linear.likely_cases(_NEAR), curves.likely_cases(_NEAR))
@@ -296,11 +296,11 @@ class SearchState:
     def extended(
         self, evidence: GroupEvidence, last: Explanation | None = None, log_odds: float = 0.0
     ) -> list[Hypothesis]:
-        """List the hypotheses with the explanations of this state and at most one more.
+        """List the hypotheses with the explanations of this search state and at most one further explanation.
 
         Args:
-            evidence: evidence of the linear model for the added explanation, or without one.
-            last: added explanation; None without one.
+            evidence: evidence of the linear model for the further explanation; if `last` is None, for this state alone.
+            last: further explanation; None for this state alone.
             log_odds: natural log of its prior odds.
 
         Returns:
@@ -318,10 +318,10 @@ class SearchState:
 
     @cached_property
     def hypotheses(self) -> list[Hypothesis]:
-        """Hypotheses about the gap that have the explanations of this state and no further effect or fault.
+        """Hypotheses about the gap that have the explanations of this search state and no further effect or fault.
 
-        They are three: as the state is, with a smooth deviation of the rubber compound from the model's laws, and with
-        rig errors of amplitude levels beyond the stated accuracy.
+        The three hypotheses are the explanations alone, with a smooth deviation of the rubber compound from the model's
+        laws, and with rig errors of amplitude levels beyond the stated accuracy.
         """
         log_posterior = self.log_weight + self.linear.log_evidence_with_level_errors
         change = max(self.change, LEVELS[-1][0] * max(class_errors(self.tests.rig, ASSUMED)))

@@ -41,10 +41,11 @@ class LinearModel(ProjectedColumns):
 
     @cached_property
     def _gains(self) -> list[tuple[Array, Array]]:
-        """Gain in log evidence and squared relative change of |K| by each group, for each prior size of its amounts.
+        """Gain in log evidence and squared relative change of |K| of each group, for each prior size of its amounts.
 
         Returns:
-            For each group, gain and squared change, (cases, blocks, sizes) each; a block is what acts at once.
+            For each group, gain and squared change, (cases, blocks, sizes) each; a block is a set of columns that act
+            together.
         """
         gains: list[list[tuple[Array, Array]]] = [[] for _ in self.groups]
         products = self.products
@@ -71,7 +72,7 @@ class LinearModel(ProjectedColumns):
         """Average the evidence for one explanation over some noise cases.
 
         Args:
-            gains: gain in log evidence, and squared relative change of |K|, (cases, blocks, sizes) each.
+            gains: gain in log evidence, and squared relative change of |K|, (cases, blocks, sizes) each, see `_gains`.
             chosen: mask of the noise cases, (cases,).
             with_compound: evidence together with a compound deviation, copied to the result; None without it.
         """
@@ -85,7 +86,7 @@ class LinearModel(ProjectedColumns):
         return GroupEvidence(total - float(np.log(log_evidence[0].size)), size, likeliest, with_compound)
 
     def group_evidence_of(self, groups: Sequence[Group]) -> list[GroupEvidence]:
-        """Compute the evidence of the tests for further explanations (groups), in parts to limit memory.
+        """Evidence of the tests for further explanations of the gap, each given as a group; in parts to limit memory.
 
         Returns:
             One evidence per group, in the same order.
@@ -100,7 +101,7 @@ class LinearModel(ProjectedColumns):
 
     @cached_property
     def evidence(self) -> GroupEvidence:
-        """Evidence of the tests if nothing further is missing, with rig errors within the stated accuracy.
+        """Evidence of the tests without a further explanation, with rig errors within the stated accuracy.
 
         With a deviation of the compound, `size` and `likeliest` are those of the deviation, relative to |K|.
         """
@@ -122,14 +123,15 @@ class LinearModel(ProjectedColumns):
         return _log_sum(self.products.base[~self._is_plain & (self.deviations == 0.0)])
 
     def likely_cases(self, far: float) -> Array:
-        """Select the noise cases that matter to the evidence for further explanations.
+        """Select the noise cases (assumed sizes of rig errors and of the compound's deviation) with a high evidence.
 
         Args:
-            far: difference in log evidence from the best case, beyond which a case is left out.
+            far: difference in log evidence from the best case beyond which a case is left out.
 
         Returns:
-            Indices of the cases within `far` of the best case, without a group or with one of `groups`. Cases without a
-            deviation of the compound are included if a case with the same rig errors and a deviation is near the best.
+            Indices of the cases within `far` of the best case. A case without a deviation is also selected if a case
+            with the same rig errors and a deviation, or the case with one of `groups` added, is within `far` of the
+            best.
         """
         plain, index = self._is_plain, self.rig.combinations[1][self.cases]
         base = np.where(plain | (self.deviations > 0.0), self.products.base, -np.inf)
@@ -154,7 +156,7 @@ class LinearModel(ProjectedColumns):
         return float(np.exp(base - _log_sum(base)) @ chdtrc(freedom, self.products.misfit))
 
     def parameters(self) -> tuple[Array, Array]:
-        """Posterior of the changes of the k rows of the Jacobian from the fit, averaged over the noise cases.
+        """Posterior of the k parameters (rows of the Jacobian) as changes from the fit, averaged over the noise cases.
 
         Returns:
             Mean, (k,), and covariance within and between the noise cases, (k, k).

@@ -1,6 +1,6 @@
-"""Regions of frequency and amplitude in which model and measurement disagree, ranked, as sentences.
+"""Regions of frequency and amplitude in which model and measurement disagree, ranked and described as sentences.
 
-A line is a run of a sweep at one constant amplitude, or at one constant frequency.
+A line is the set of points of a sweep at one constant amplitude, or at one constant frequency, over its repeats.
 """
 
 from collections.abc import Iterator, Sequence
@@ -47,13 +47,13 @@ _HARMONICS = {
 
 @dataclass(frozen=True, eq=False)
 class LineMisfit:
-    """Mean misfit of one line of a sweep (the runs at one held amplitude or frequency) over its repeats.
+    """Mean misfit of one line of a sweep (all runs at one constant amplitude or frequency) over its repeats.
 
     Args:
         name: name of the test.
         direction: direction or specimen of the test.
         preload: preload of the test; None if it is unknown.
-        stepped: quantity that varies along the line, "frequency" or "amplitude"; None if neither is held.
+        stepped: quantity that varies along the line, "frequency" or "amplitude"; None if neither is constant.
         frequency: frequency of each point [Hz], (n,).
         amplitude: zero-to-peak amplitude of each point [m or rad], (n,).
         misfit: complex relative difference K_measured/K_model - 1 of each point, averaged over the repeats, (n,).
@@ -76,7 +76,7 @@ class LineMisfit:
 
     @property
     def label(self) -> str:
-        """Text of the held amplitude or frequency and preload, "0.1 mm" or "10 Hz"; else the name of the test."""
+        """Text of the line's constant quantity and preload, such as "0.1 mm" or "10 Hz"; else the name of the test."""
         held = f"{self.frequency[0]:.4g} Hz" if self.stepped else self.name
         if self.stepped == "frequency":
             held = shown_amplitude(self.direction, float(self.amplitude[0]))
@@ -91,7 +91,7 @@ class LineMisfit:
 
 
 def line_misfits(sweep: MeasuredSweep, model: Model) -> Iterator[LineMisfit]:
-    """Compare a model with each line of a sweep: the runs at one held amplitude or frequency.
+    """Compare a model with each line of a sweep: all runs at one constant amplitude or frequency.
 
     Yields:
         Mean misfit along a line, over its repeats.
@@ -117,7 +117,7 @@ def find_regions(evidence: Evidence) -> tuple[MisfitRegion, ...]:
 
 
 def _sweep_regions(evidence: Evidence) -> Iterator[MisfitRegion]:
-    """Yield regions of smooth deviation of sweeps from the model: one of storage, one of loss for each direction."""
+    """Yield for each direction the regions where the storage and the loss of sweeps deviate smoothly from the model."""
     _, sweeps = split_by_kind(evidence.data_sets)
     lines = [line for sweep in sweeps for line in line_misfits(sweep, evidence.model)]
     for direction, stepped in dict.fromkeys((line.direction, line.stepped) for line in lines):
@@ -155,7 +155,7 @@ def _describe_sweep_misfit(
     touched: Sequence[int],
     spans: tuple[tuple[float, float], tuple[float, float]],
 ) -> str:
-    """Sentence on the sign and size of a smooth misfit, and its trends along each line and between lines.
+    """Sentence on the sign and size of a smooth misfit of sweeps, and on its trends along each line and between lines.
 
     Args:
         part: "storage" or "loss".
@@ -192,7 +192,7 @@ def _describe_sweep_misfit(
 
 
 def _trend(stepped: str, step: Array, misfit: Array) -> str:
-    """Phrase on the trend of a misfit along a line: constant, or with the power of the step that correlates best.
+    """Phrase on the trend of a misfit along a line: constant, or the power of the stepped quantity that fits best.
 
     Args:
         stepped: "frequency" or "amplitude".
@@ -211,7 +211,7 @@ def _trend(stepped: str, step: Array, misfit: Array) -> str:
 
 
 def _trend_verb(first: float, last: float) -> str:
-    """Verb for a misfit that grows, fades or changes sign: "grows", "fades", "goes from above to below the model".
+    """Verb phrase for a misfit along a line: "grows", "fades" or "goes from above to below the model".
 
     Args:
         first, last: measured minus model stiffness, relative to |K|, at both ends of a line.

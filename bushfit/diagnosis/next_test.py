@@ -37,7 +37,7 @@ class NextTest:
 
     Args:
         sentence: instruction to the laboratory.
-        hours: time on the rig, with the change of the set-up [h].
+        hours: time on the rig, including the change of the set-up [h].
         place: direction or specimen; None for the direction or specimen of the last test.
         frequencies: frequencies [Hz], or multiples of the highest frequency tested if `beyond`; None for all
             frequencies tested.

@@ -91,7 +91,7 @@ class PowerLaw:
         frequency_power: power p of frequency, with the ends of its interval.
         amplitude_power: power q of amplitude, with the ends of its interval.
         is_likely: True if the evidence of the power law exceeds that of a smooth curve of any form.
-        of_one_place: True if one direction or specimen was tested, so that no measure is told from another.
+        of_one_place: True if a single direction or specimen was tested, so that the measures cannot be distinguished.
     """
 
     measure: Measure
@@ -104,14 +104,14 @@ class PowerLaw:
 
     @property
     def determined(self) -> list[bool]:
-        """True for each of phase, power of frequency and power of amplitude that the tests determine."""
+        """Three flags: True if the tests determine the phase, the power of frequency and the power of amplitude."""
         widths = (_PHASE_WIDTH, _POWER_WIDTH, _POWER_WIDTH)
         intervals = (self.phase_deg, self.frequency_power, self.amplitude_power)
         return [high - low < 2.0 * width for (_, low, high), width in zip(intervals, widths, strict=True)]
 
     @property
     def sentence(self) -> str:
-        """Text on the law, such as "more loss, grows as f^0.8, independent of amplitude: acts like a damper"."""
+        """Text on the power law, such as "more loss, grows as f^0.8, independent of amplitude: acts like a damper"."""
         phase, low, high = self.phase_deg
         near = next((text for quarter, text in _QUARTERS.items() if low <= quarter <= high), "")
         turned = np.exp(1j * np.radians(phase))
@@ -133,7 +133,7 @@ class PowerLaw:
         return ", ".join(parts) + (f": acts like {like}" if like else "")
 
     def _known_law(self) -> str:
-        """Names of the known laws (such as spring or damper) nearest in phase and powers; "" if none is near."""
+        """Name of the element (spring, damper, ...) with nearly the phase and powers of this law; "" without one."""
         ends = np.array([self.phase_deg, self.frequency_power, self.amplitude_power])[:, 1:]
         errors = np.maximum(np.ptp(ends, axis=1) / 2.0 / Z95, 1e-9)
         distances = {}
@@ -148,10 +148,10 @@ class PowerLaw:
 
 @dataclass(frozen=True, eq=False)
 class Term:
-    """Complex stiffness that is added to a model at p operating points, to find the power law of a gap.
+    """Complex stiffness added to a model at p operating points, whose power law of f and X is sought.
 
-    The points are those of all tests except tests of coupons. A value is the added stiffness at the points in the unit
-    `measure`, (p,); a shape is such a value before the multiplication by an amount.
+    The points belong to all tests except tests of coupons. A value is the added stiffness at the points in the unit
+    `measure`, (p,). A shape is a value for a unit amount.
 
     Args:
         evidence: the fitted model and the tests.
@@ -176,7 +176,7 @@ class Term:
 
     @cached_property
     def points(self) -> Array:
-        """Natural log of frequency, and of motion (displacement, rotation or strain), minus their means, (p, 2)."""
+        """Centred natural logs of frequency and motion (displacement, rotation or strain) at each point, (p, 2)."""
         model, over_strain = self.evidence.model, self.measure != "stiffness"
         axes = [
             (test.frequency, test.amplitude * (model.unit_strain(test.direction) if over_strain else 1.0))
@@ -199,11 +199,11 @@ class Term:
         return np.concatenate([np.full(test.frequency.size, per_unit(test.direction)) for test, _ in self.tests])
 
     def scaled(self, shapes: Array, model: Model) -> Array:
-        """Scale c shapes of the added stiffness, (c, p), so that the largest change by each is 100 % of |K|."""
+        """Scale c shapes of the added stiffness, (c, p), so that each changes the stiffness by at most 100 % of |K|."""
         return shapes / np.abs(shapes * self.unit(model) / self.stiffness(model)).max(axis=-1)[:, None]
 
     def residual(self, value: Array, model: Model) -> Array:
-        """Whitened residuals of a model with an added stiffness `value`, in the unit of the law, (p,).
+        """Whitened residuals of a model with a stiffness, `value` (p,) in the unit `measure`, added at each point.
 
         Returns:
             Residuals of all tests and priors, (n,).
@@ -226,8 +226,8 @@ class Term:
             shapes: c shapes of the added stiffness, (c, p).
 
         Returns:
-            Residuals extrapolated to no added stiffness, (n,); derivatives by the coordinates of the parameters,
-            (k, n); and by the amounts of each shape in phase and in quadrature, (c, 2, n).
+            Residuals extrapolated to no added stiffness, (n,); derivatives with respect to the coordinates of the
+            parameters, (k, n); and with respect to the amounts of each shape in phase and in quadrature, (c, 2, n).
         """
         names, place = self.evidence.solution.coordinates.names, self.evidence.residual_rows
         added, changes = value * self.unit(model), np.concatenate((shapes, 1j * shapes)) * self.unit(model)
@@ -257,7 +257,7 @@ def nearest_power_law(
     Args:
         fitted: the fitted model and the tests.
         rig: stated accuracy class of the rig (gain and phase errors).
-        start: starting values read from the data; the gap may have distorted those of the fit.
+        start: starting values estimated from the data, because the gap may distort the fitted values.
         bounds: limits of parameters inside their general limits.
 
     Returns:
@@ -294,7 +294,7 @@ class _Grid:
 
     Args:
         measure: unit of the added stiffness.
-        linear: linear model with one group (in phase and in quadrature) for each pair.
+        linear: linearised model with one group of two columns (in phase and in quadrature) for each pair of powers.
         powers: powers of frequency and amplitude, (g, 2).
         step: spacing of the grid along each axis, (2,); 0 along an axis on which the tests do not differ.
     """
@@ -311,7 +311,7 @@ class _Grid:
 
     @property
     def share(self) -> Array:
-        """Posterior probability of each of the g pairs of exponents of frequency and amplitude, (g,)."""
+        """Posterior probability of each of the g pairs of powers of frequency and amplitude, (g,)."""
         return np.exp(self.log_evidences - logsumexp(self.log_evidences))
 
     @property
@@ -339,12 +339,12 @@ def _settled_grid(fitted: Evidence, term: Term, plain: LinearModel, model: Model
     Args:
         fitted: the fitted model and the tests.
         term: complex stiffness that is added to the model, with its unit.
-        plain: linearised residuals of the model without a term, which describe the errors of the rig.
+        plain: linearised model without the added stiffness, from which the errors of the rig are taken.
         model: model at its starting parameters.
         bounds: limits of parameters inside their general limits.
 
     Returns:
-        The last grid, about the model and the amount of the law refitted at each step; None without convergence.
+        The last grid, linearised around the refitted model and law; None without convergence.
     """
     # at first around the measured stiffness, by which a term of any size is linear
     value = np.concatenate([test.measured - test.noise_free(model).measured for test, _ in term.tests])

@@ -28,7 +28,7 @@ class Products:
     Args:
         base: natural log of the prior weight of the case times the evidence without a further explanation, (cases,).
         misfit: r^T P r of the residuals r, (cases,).
-        changes: square of the largest relative change of |K| by the compound's deviation, (cases,).
+        changes: square of the largest relative change of |K| due to the compound's deviation, (cases,).
         projections: U^T P r of the blocks U, an array (cases, blocks, width) for each width.
         grams: U^T P U of the blocks U, an array (cases, blocks, width, width) for each width.
     """
@@ -42,9 +42,9 @@ class Products:
 
 @dataclass(frozen=True, eq=False)
 class ProjectedColumns:
-    """Residuals of a fitted model, and residual columns of what may explain them, without what the parameters explain.
+    """Residuals of a fitted model and columns of possible explanations, without the part that parameters absorb.
 
-    A residual column is the change of the residuals by an explanation of unit size.
+    A residual column is the change of the residuals due to an explanation of unit size.
 
     Args:
         residual: residuals in units of the scatter from point to point, (n,).
@@ -53,7 +53,7 @@ class ProjectedColumns:
         rig: errors of the rig. Each of its noise cases assumes a size of these errors and of the compound's deviation
             from the model's laws.
         groups: candidate explanations, each a group of residual columns.
-        chosen_cases: indices of the noise cases to average over; None for all.
+        chosen_cases: indices of the noise cases to average over; None for all cases.
         compound: columns of the compound's deviation at unit size, part of every hypothesis; None without a deviation.
     """
 
@@ -144,7 +144,8 @@ class ProjectedColumns:
             by_noise: squared norms of the rows of the Jacobian, whitened by noise alone, (k,).
 
         Returns:
-            Arrays of `Products` in order, those of projections and grams one by one.
+            The fields of `Products` for these cases, in order; the arrays of projections and grams are returned one by
+            one.
         """
         flat, has_prior = slice(1, 1 + len(self.jacobian)), self.precision > 0.0
         scale = np.sqrt(np.maximum(by_noise + self.precision, np.finfo(float).tiny))

@@ -43,7 +43,7 @@ class Proposal(Explanation):
         model: model with the effect as a start for a refit: at the best shape parameters and zero amount (or the
             suggested amount if the amount is fitted in its logarithm). An effect that replaces a branch starts from
             values that the branch suggests.
-        score: decrease of chi-square if the model were linear.
+        score: decrease of chi-square expected from the linearised model.
         visible: True if the tests could distinguish the effect from a change of the model's parameters.
     """
 
@@ -93,7 +93,7 @@ def proposals(evidence: Evidence, excluded: Collection[str], fixed: Sequence[str
 
 
 def scores(evidence: Evidence, columns: Array) -> tuple[Array, Array, Array]:
-    """Compute the decrease of chi-square if each of c changes of the residuals is fitted together with the parameters.
+    """Decrease of chi-square if each of c changes of the residuals is fitted together with the parameters.
 
     Args:
         evidence: the fitted model and the tests.
@@ -114,7 +114,7 @@ def scores(evidence: Evidence, columns: Array) -> tuple[Array, Array, Array]:
 
 
 def has_used_parameters(effect: Effect, model: Model) -> bool:
-    """True if a model has the parameters of its branches on which the law of an effect depends."""
+    """True if a model has all parameters of its branches that the law of an effect uses."""
     return not (isinstance(effect, Branch) and {*effect.uses} - {*model.values})
 
 
@@ -144,7 +144,7 @@ def missing_effects(model: Model, places: Collection[str], excluded: Collection[
 
 
 def _replacement(evidence: Evidence, effect: Effect, fixed: Sequence[str]) -> tuple[Model, float] | None:
-    """Replace a branch of a fitted model by an effect, at the starting values with the best expected fit.
+    """Replace a branch of a fitted model by an effect, with the starting values that promise the best fit.
 
     Args:
         evidence: the fitted model and the tests.
@@ -169,11 +169,11 @@ def _replacement(evidence: Evidence, effect: Effect, fixed: Sequence[str]) -> tu
 def sensitivity(
     model: Model, data_sets: Sequence[MeasuredTest], effect: Effect
 ) -> tuple[list[dict[str, float]], Array]:
-    """Differentiate the residuals of tests by the amount of a missing effect, on a grid of its shape parameters.
+    """Derivatives of residuals with respect to the amount of a missing effect, on a grid of its shape parameters.
 
     A shape parameter is any other than the amount, such as the frequency of a resonance. The derivative is the
     difference between a small amount and none in the same call, so that iterative solutions have the same error in
-    both. Shapes without a finite response, as within free play, are left out.
+    both. Shape parameters without a finite response (such as a motion inside free play) are left out.
 
     Args:
         model: the fitted model.

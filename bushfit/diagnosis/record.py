@@ -66,7 +66,7 @@ class MisfitRegion:
         amplitude: lowest and highest amplitude, zero-to-peak [m or rad, or strain].
         component: "storage" or "loss" stiffness of sweeps, or "force" of a loop.
         excess: root mean square of the smooth misfit, measured minus model, in units of its noise.
-        reading: description of the region as a sentence.
+        reading: sentence that describes the region.
     """
 
     direction: Place
@@ -111,11 +111,11 @@ class Odds:
     Args:
         nothing: probability that nothing is missing beyond noise and tolerance.
         explanations: text and probability (if anything is missing) of each explanation, the most probable first.
-        fits: fitted model of each explanation, with its covariance; None for the explanation of the result, and for an
+        fits: fitted model of each explanation, with its covariance; None for the reported explanation, and for an
             explanation that was not fitted.
         labels: names of the effects, mistakes and faults of each explanation, joined by " + ".
-        are_alternatives: True if bands include the fits: of explanations that the tests cannot decide between, and of
-            rivals of the explanation of a part of the gap.
+        are_alternatives: True if the bands of predictions include `fits`, because the tests cannot decide between the
+            explanations or because only a part of the gap is explained.
     """
 
     nothing: float
@@ -153,11 +153,11 @@ class CandidateResult:
 
     Args:
         name: name of the effect or mistake.
-        score: decrease of chi-square if the model were linear.
+        score: decrease of chi-square expected from the linearised model.
         gain: decrease of chi-square in a refit; None without a refit.
         probability: probability that the candidate is part of the explanation.
         parameters: fitted values [SI] by parameter name.
-        why: reason why the candidate was added or not.
+        why: reason for adding the candidate to the model, or for leaving it out.
     """
 
     name: str
@@ -175,17 +175,17 @@ class Diagnosis:
     Args:
         verdict: verdict in one word, such as "named".
         summary: verdict as a sentence.
-        effects: effects or mistakes that were named, or the first of indistinguishable sets.
+        effects: effects or mistakes that were named; of a set that the tests cannot distinguish, the first.
         where: regions of disagreement between the starting model and the tests.
         remainder: regions of disagreement that remain with the added effects.
         holdout: errors of held-out parts of the tests, without and with the added effects.
-        next_test: measurement that would decide or confirm; "" without one.
+        next_test: measurement that would decide between explanations or confirm the verdict; "" without one.
         candidates: all effects and mistakes considered, the highest score first.
         before: starting model, refitted to all tests.
         after: model with the added effects; for a mistake in the record, fitted to the corrected tests.
         result: model to use, with its uncertainty: `after`, or `before` for a mistake in the record.
         notes: warnings as sentences.
-        description: power law of a gap without a name; None without such a gap or law.
+        description: power law of a gap that no known effect explains; None without such a gap or law.
         odds: reported explanations with their probabilities.
     """
 
@@ -212,12 +212,12 @@ class Diagnosis:
 
     @property
     def changed(self) -> bool:
-        """True if the fit after the diagnosis differs from the starting fit: effects added, or a record corrected."""
+        """True if added effects or a corrected record make the final fit differ from the starting fit."""
         return self.after is not self.before
 
     @property
     def added(self) -> bool:
-        """True if the model to use has other effects than the starting model."""
+        """True if the effects of the model to use differ from those of the starting model."""
         return self.result.model.effects != self.before.model.effects
 
     @property

@@ -1,4 +1,4 @@
-"""Tests as recorded, or with a corrected record, and what may explain a gap in them independently of the model."""
+"""Tests as recorded or with one corrected mistake, and explanations of a gap that do not depend on effects."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ class Tests:
         base: fit of the starting model; its residuals are whitened by scatter and by errors that points share.
         rig: stated accuracy class of the rig (gain and phase errors).
         without: names of effects not to consider.
-        log_prior: natural log of the prior probability that these are the right records and nothing is missing.
+        log_prior: natural log of the prior probability that this record is right and nothing is missing.
         claim: mistake that is corrected; None for the tests as recorded.
-        change: relative change of the recorded quantities by the correction; 0 for the tests as recorded.
+        change: relative change of the recorded quantities due to the correction; 0 for the tests as recorded.
         max_effects: maximum number of effects of an explanation.
     """
 
@@ -48,20 +48,20 @@ class Tests:
 
     @cached_property
     def errors(self) -> RigErrors:
-        """Errors of the rig that points share, as changes of residuals in units of the scatter from point to point."""
+        """Rig errors that points share, as changes of the residuals in units of the scatter from point to point."""
         return rig_errors(self.bare, self.rig)
 
     @cached_property
     def compound(self) -> Group | None:
-        """Changes of the residuals (in units of the scatter) by a smooth deviation of the rubber from the model's laws.
+        """Changes of the residuals, in units of the scatter, if the rubber deviates smoothly from the model's laws.
 
-        They are used to compare hypotheses; None without tests.
+        Hypotheses are compared with these changes. None without tests.
         """
         return compound(self.bare)
 
     @cached_property
     def compound_in_fits(self) -> Group | None:
-        """Changes of the residuals (whitened as in a fit) by a smooth deviation of the rubber from the model's laws.
+        """Changes of the residuals, whitened as in a fit, if the rubber deviates smoothly from the model's laws.
 
         A refit with an effect also estimates the amounts of these changes, without a prior; None without tests.
         """
@@ -69,7 +69,7 @@ class Tests:
 
     @cached_property
     def faulty_parts_in_fits(self) -> dict[str, FaultyPart]:
-        """Faulty parts by name, with the residuals that a fit minimises in place of those in units of the scatter."""
+        """Faulty parts by name; their changes of the residuals are whitened as in a fit, not in units of scatter."""
         return {part.name: part for part in find_faulty_parts(self.base)}
 
     @cached_property

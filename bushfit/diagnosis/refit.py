@@ -1,4 +1,4 @@
-"""Candidate refits: effects fitted together with all parameters of the model."""
+"""Refit the model with each candidate effect, all parameters together."""
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -35,7 +35,7 @@ def refitted(
     bounds: Bounds,
     columns: Array | None = None,
 ) -> dict[str, Evidence]:
-    """Fit models with proposed effects, all parameters of each model together.
+    """Fit models with proposed effects; all parameters of each model are fitted together.
 
     Args:
         evidence: fit with the tests.

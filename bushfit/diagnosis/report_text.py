@@ -67,7 +67,7 @@ class DiagnosisWriter:
 
     @property
     def first(self) -> Composition | None:
-        """Most probable of the explanations of the gap that are reported; None if nothing is missing."""
+        """Most probable explanation of the gap that is reported; None if nothing is missing."""
         return self.finding.reported[0] if self.finding.reported else None
 
     def diagnosis(self) -> Diagnosis:
@@ -118,14 +118,14 @@ class DiagnosisWriter:
         return replace(self, finding=finding).diagnosis()
 
     def _fit_with(self, first: Composition) -> tuple[Evidence, Covariance | None]:
-        """Fit the starting model with the effects that are certain.
+        """Fit the starting model with the effects of an explanation that are certain.
 
         Args:
-            first: explanation with these effects. If the compound deviates beside them, the amounts of the effects are
-                their posterior means, because a fit without the deviation would distort them.
+            first: the explanation. If it also contains a deviation of the compound, the amounts of the effects are
+                fixed at their posterior means, because a fit without the deviation would distort them.
 
         Returns:
-            The fit, and the covariance of the amounts that it kept fixed; None without any.
+            The fit, and the covariance of the amounts that were fixed; None if all were fitted.
         """
         base, bounds, names = self.request.base, self.request.data.bounds, self.finding.names
         if not names:
@@ -175,10 +175,10 @@ class DiagnosisWriter:
         )
 
     def _open(self, first: Composition) -> Diagnosis:
-        """Diagnosis of a gap without a certain cause: what closes it, candidates for the cause, and a deciding test.
+        """Diagnosis of a gap without a certain cause: additions that close it, candidate causes, and a deciding test.
 
-        Effects that all probable explanations contain, and a smooth correction for the rest, close the gap, unless
-        tests or records may be wrong. The candidates are the reported explanations with causes.
+        If neither a test nor the record is suspected to be wrong, the effects that all probable explanations contain
+        close the gap together with a smooth correction. The candidates are the reported explanations with causes.
         """
         finding, reported, verdict = self.finding, self.finding.reported, self.finding.verdict
         bounds = self.request.data.bounds
@@ -255,13 +255,13 @@ class DiagnosisWriter:
             summary: verdict as a sentence.
             after: fit with the additions, or the starting fit.
             entries: named effects or mistakes.
-            remainder: what the entries do not explain; empty if they explain the gap.
-            verdict: verdict in one word; None for that of the finding.
+            remainder: names of the parts of the gap that the entries do not explain; empty if they explain it all.
+            verdict: verdict in one word; None for the verdict of `finding`.
             places: hypothesis whose faulty parts of the tests are reported; None without any.
             next_test: advice on the next test; "" for the usual confirmation of the first entry.
             gap: description of a gap without a name; None without one.
             holdout: residuals of held-out tests, if they were computed before.
-            known: covariance of parameters of effects that `after` kept fixed; None without any.
+            known: covariance of the effects' parameters that the fit `after` kept fixed; None without any.
         """
         base, after = self._with_free_gains(self.request.base), self._with_free_gains(after)
         verdict, bounds = verdict or self.finding.verdict, self.request.data.bounds
@@ -303,7 +303,7 @@ class DiagnosisWriter:
         )
 
     def _with_free_gains(self, evidence: Evidence) -> Evidence:
-        """Refit a model without an assumed gain error in the weights of loops; unchanged if the campaign states it."""
+        """Refit a model without the assumed gain error of loops; unchanged if the campaign states a gain error."""
         loops = split_by_kind(evidence.data_sets)[0]
         gain_is_stated = self.request.data.campaign.rig.stiffness_errors[0] is not None
         if gain_is_stated or not any(loop.gain_weighs for loop in loops):
@@ -323,7 +323,7 @@ class DiagnosisWriter:
 
 
 def _may_be_absent(name: str, result: Result) -> bool:
-    """True if an effect may do nothing: its amount is neutral, or its 95 % interval contains the neutral amount."""
+    """True if an effect may be absent: its amount is neutral, or its 95 % interval contains the neutral amount."""
     effect = get_effect(name)
     amount, neutral = qualified_name(effect, effect.amount), effect.amount.neutral
     if neutral is None or effect.replaces is not None or amount not in result.model.values:

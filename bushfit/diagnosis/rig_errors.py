@@ -1,4 +1,4 @@
-"""Errors of the rig as changes of residuals: shared by a run, a level (of amplitude) or a loop, and drift in a run."""
+"""Errors of the rig as changes of residuals: errors shared by a run, a level or a loop, and drift along a run."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -33,7 +33,7 @@ class NoiseCase:
         errors: standard deviations of the errors of a run, of a level (all points at one constant amplitude or
             frequency), of drift along a run, and of a loop, relative to those of the rig's accuracy class.
         log_weight: natural log of the prior probability of the case.
-        wide: True if errors of levels are larger than the accuracy class allows.
+        wide: True if the case assumes errors of levels larger than the accuracy class allows.
         compound: standard deviation of the compound's deviation from the model's laws, relative to |K|.
     """
 
@@ -50,8 +50,8 @@ class Block:
 
     Args:
         rows: indices of the rows in the residual vector, (n,).
-        columns: change of the whitened residuals by each of w errors at the size that the accuracy class of the rig
-            states, (w, n).
+        columns: change of the whitened residuals due to each of w errors at the size of the rig's accuracy class, (w,
+            n).
         kinds: kind of each error (run, level, drift or loop), (w,).
         scatters: True for points of sweeps, whose scatter differs between noise cases; False for loops.
     """
@@ -64,7 +64,7 @@ class Block:
 
 @dataclass(frozen=True, eq=False)
 class RigErrors:
-    """Errors of the rig that points of the tests share, and the sizes that they may have; independent of the model.
+    """Errors of the rig that points of the tests share, and their possible sizes; independent of the model.
 
     Args:
         blocks: sets of residual rows that share errors, with residuals in units of the scatter from point to point.
@@ -76,7 +76,7 @@ class RigErrors:
 
     @cached_property
     def combinations(self) -> tuple[Array, Array]:
-        """Distinct combinations of sizes of the rig's errors; cases that differ in the compound alone share one.
+        """Distinct combinations of sizes of the rig's errors; noise cases that differ only in the compound share one.
 
         Returns:
             Scatter and sizes of the errors of runs, levels, drift and loops, (combinations, 1 + kinds); and the index
@@ -116,8 +116,8 @@ class RigErrors:
 def in_scatter_units(evidence: Evidence) -> Evidence:
     """Express the residuals of a fit in units of the scatter from point to point, to compare hypotheses.
 
-    Residuals of sweeps are differences of ln K (gain and phase): relative to the measurement, noise would seem smaller
-    where the model is wrong.
+    Residuals of sweeps are differences of ln K (gain and phase), because a difference relative to the measurement would
+    make noise appear smaller where the model is wrong.
 
     Args:
         evidence: the fitted model and the tests.
@@ -197,7 +197,7 @@ def error_blocks(evidence: Evidence, rig: RigSettings) -> Iterator[Block]:
 
 
 def _shared_errors(count: int, runs: Sequence[Array]) -> tuple[Array, Array]:
-    """Errors that the n points of a level share, at unit size: of the level, of each run, and drift along each run.
+    """Errors shared by the n points of a level, at unit size: of the level, of each run, and drift along each run.
 
     Args:
         count: number n of points.

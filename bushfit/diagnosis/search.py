@@ -1,4 +1,4 @@
-"""Search for the most probable sets of explanations of a gap, which grow by one explanation at a time.
+"""Search for the most probable sets of explanations of a gap, extended by one explanation at a time.
 
 The evidence of effects comes from refits of all parameters, by Laplace's method; that of faulty parts and of curves
 without a name comes from a linear model.
@@ -127,7 +127,7 @@ class Search:
         Args:
             kind: kind of the explanation.
             name: name of the explanation.
-            depth: number of explanations that it is added to; the order of explanations does not count.
+            depth: number of explanations in the set that it is added to; their order is irrelevant.
         """
         if (kind, name) not in self._log_priors:
             self._log_priors[kind, name] = min(odds for (other, _), odds in self._log_priors.items() if other == kind)
@@ -142,7 +142,8 @@ class Search:
     def _note(self, hypotheses: Sequence[Hypothesis]) -> None:
         """Record hypotheses, alone and with a disturbance at each frequency where several outliers were left out.
 
-        Of two fits of the same set of explanations, a refitted one replaces a linear one; else the more probable stays.
+        Of two fits of the same set of explanations, a refit replaces a linear fit; otherwise the more probable fit
+        stays.
         """
         candidates = list(hypotheses)
         for hypothesis, part in product(hypotheses, self.request.outlier_clusters):
@@ -163,7 +164,8 @@ class Search:
         Args:
             state: state that the effects are added to.
             by_evidence: number of effects with the highest evidence in the linear model.
-            by_score: number of effects with the largest expected decrease of chi-square, better for large gaps.
+            by_score: number of effects with the largest expected decrease of chi-square, a better criterion for large
+                gaps.
         """
         scores = {p.name: p.score for p in state.proposals if state.key | {p.name} not in self._visited}
         prior = {name: self._log_odds("effect", name, 0) for name in scores}
@@ -242,7 +244,7 @@ class Search:
             yield self._visit(grown)
 
     def _without_earlier(self, state: SearchState) -> Iterator[SearchState]:
-        """Yield the refitted state without each earlier effect, which the last effect may make unnecessary."""
+        """Yield for each earlier effect, which the last may make unnecessary, the refitted state without it."""
         earlier = () if state.faulty_parts else state.effects[:-1]
         shorter = {name: state.evidence.model.without(name) for name in earlier}
         for name, model in shorter.items():
@@ -267,14 +269,14 @@ class Search:
     def _with_common_start(self, states: list[SearchState]) -> list[SearchState]:
         """Refit the rivals of the most probable state from its values, so that all are compared at one minimum.
 
-        A rubber that deviates from the model's laws has several fits of almost equal misfit. An effect is not to be
-        preferred because its fit alone found the best of these.
+        A rubber that deviates from the model's laws has several fits of almost equal misfit. An effect must not be
+        preferred only because its fit happened to find the best of these.
 
         Args:
             states: states of one round of the search.
 
         Returns:
-            The states, the refitted where a refit is more probable.
+            The states; a refitted state replaces the original if it is more probable.
         """
         leader = max(states, key=lambda state: state.log_posterior)
         near = [n for n, state in enumerate(states) if state is not leader and not state.faulty_parts]

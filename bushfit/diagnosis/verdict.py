@@ -32,7 +32,7 @@ class Composition:
         best: most probable hypothesis with these parts.
         names: effects in the set. If the set has a deviation of the compound, effects of the rubber are not listed,
             because the deviation includes them.
-        unnamed: True if a curve without a name, or a deviation of the compound, is part of the explanation.
+        unnamed: True if an unnamed smooth curve, or a deviation of the compound, is part of the explanation.
     """
 
     probability: float
@@ -58,7 +58,7 @@ class Composition:
 
     @property
     def may_mislead(self) -> bool:
-        """True if a fault at one amplitude level, repeat or frequency may bias the effects that are reported with it.
+        """True if the explanation has a fault (of an amplitude level, repeat or frequency) that may bias its effects.
 
         A faulty loop is a separate test, and points that were left out have no weight, so they distort no effect.
         """
@@ -68,14 +68,14 @@ class Composition:
 
 @dataclass(frozen=True, eq=False)
 class Finding:
-    """Verdict on the gap between model and tests, with the explanations to report and their probabilities.
+    """Verdict on the gap between model and tests, and the explanations to report.
 
     Args:
         verdict: verdict in one word.
         nothing: probability that nothing is missing beyond noise and tolerance.
         reported: explanations to report, the nearly certain one or the most probable first; empty if consistent.
         leads: names of effects that reduce the gap but do not explain it.
-        names: names of effects that are certain: the explanation or a part of it.
+        names: names of effects that are certain, which are all or a part of the explanation.
     """
 
     verdict: Verdict
@@ -91,8 +91,9 @@ def decide_verdict(hypotheses: Sequence[Hypothesis], tolerance: float, *, gap_st
     Args:
         hypotheses: all hypotheses that were compared, the most probable first.
         tolerance: relative change of |K| below which an explanation is neglected.
-        gap_stays: True if held-out tests show a gap beside the most probable explanation. The compound then deviates
-            from the model's laws in a way that no effect describes, and only hypotheses with a deviation are compared.
+        gap_stays: True if held-out tests show a gap that remains with the most probable explanation. The compound then
+            deviates from the model's laws in a way that no effect describes, and only hypotheses with a deviation are
+            compared.
 
     Returns:
         Verdict, probability that nothing is missing, and the explanations behind the verdict.

@@ -36,7 +36,7 @@ _MAXIMUM_ROUNDS = 4
 def diagnose(
     data: PreparedCampaign, model: Model | None = None, settings: DiagnosisSettings | None = None
 ) -> Diagnosis:
-    """Find regions where model and measurement disagree, and name and add missing effects.
+    """Diagnose a campaign: find regions where model and measurement disagree, name missing effects and add them.
 
     Args:
         data: campaign with prepared tests; all directions are used.
@@ -113,7 +113,8 @@ def _initial_fit(
         fixed: names of parameters that are not fitted.
 
     Returns:
-        The fit, starting values read from the data by parameter, and the points that a robust fit left out.
+        The fit, starting values by parameter that were estimated from the data, and the points that a robust fit left
+        out.
     """
     hint = "add measured tests to the campaign"
     data_sets = data.require_tests(data.data_sets, "there is nothing to diagnose", hint)
