@@ -73,7 +73,7 @@ class GroupEvidence:
 
     @property
     def total(self) -> float:
-        """Natural log of the marginal likelihood, summed over the cases with and without a deviation of the compound."""
+        """Natural log of the marginal likelihood, summed over compounds with and without a deviation."""
         if self.with_compound is None:
             return self.log_evidence
         return float(np.logaddexp(self.log_evidence, self.with_compound.log_evidence))
