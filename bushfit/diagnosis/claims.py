@@ -34,7 +34,7 @@ _MOST_POINTS = 60
 #: Misfit with a mistake corrected, relative to the misfit of the tests as recorded, up to which a fit follows; above 1
 #: because the grid is coarse.
 _WORTH_A_FIT = 1.3
-#: Least relative change of the misfit by a mistake; one that changes less is equivalent to a change of parameters.
+#: Smallest relative change of the misfit of a mistake; a smaller change is equivalent to a change of parameters.
 _LEAST_CHANGE = 1e-6
 #: Relative term on the diagonal of the normal equations that keeps three similar columns solvable.
 _RIDGE = 1e-12

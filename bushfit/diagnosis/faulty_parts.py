@@ -161,9 +161,9 @@ def _common_fault(
         name: name of the fault for reports.
         sweeps: sweeps that have the fault.
         chosen: mask of the faulty points of each sweep, (n,) each.
-        columns: change of the whitened residuals of `sweeps` by a unit of each of c errors, (c, rows); None for gain,
+        columns: change of the whitened residuals of `sweeps` per unit of each of c errors, (c, rows); None for gain,
             phase and their slopes.
-        unit: complex relative change of the stiffness by a unit of each error at p points of the part, (c, p).
+        unit: complex relative change of the stiffness per unit of each error at p points of the part, (c, p).
     """
     columns = _shift_columns(evidence, sweeps, chosen, sloping=True) if columns is None else columns
     frequency, amplitude = (

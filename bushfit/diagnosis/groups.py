@@ -6,7 +6,7 @@ import numpy as np
 
 from bushfit.effects.contract import Array
 
-#: Relative change of |K| by a unit amount, below which the tests do not show the column.
+#: Relative change of |K| per unit amount below which the tests do not show a column.
 _UNSEEN = 1e-9
 
 
@@ -42,7 +42,7 @@ class Group:
 
     @property
     def scaled(self) -> Array:
-        """Changes of all n residuals by the c columns, scaled for the prior of their amounts, (c, n).
+        """Changes of all n residuals for the c columns, scaled for the prior of their amounts, (c, n).
 
         If the columns are alternatives, each is divided by its change of |K|, so that an amount of 1 changes |K| by
         100 %, and is zero if it does not change |K|. Columns that act together are not scaled.

@@ -61,7 +61,7 @@ class Hypothesis:
         log_posterior: natural log of prior times evidence, not normalised.
         change: largest relative change of |K| by any of the explanations.
         last: last explanation, if its evidence is that of the linear model; None without one.
-        last_change: relative change of |K| by the last explanation, or by the compound's deviation; 0 without either.
+        last_change: relative change of |K| due to the last explanation or the compound's deviation; 0 without either.
         compound_deviates: True if the compound deviates from the model's laws in addition.
         levels: True if errors of amplitude levels are larger than the accuracy class of the rig allows.
         clusters: disturbances at frequencies with several outliers that were left out.
@@ -132,7 +132,7 @@ class SearchState:
             parameter at an end of its range.
         log_density: natural log of the prior density of these coordinates, with the factor of Laplace's method.
         amounts: prior standard deviation of each faulty part's deviation, relative to |K|.
-        change: largest relative change of |K| by the effects and faulty parts.
+        change: largest relative change of |K| due to the effects and faulty parts.
     """
 
     tests: Tests

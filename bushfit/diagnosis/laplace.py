@@ -24,13 +24,14 @@ def laplace(name: str, evidence: Evidence, before: Evidence) -> tuple[float, dic
 
     Returns:
         Natural log of the prior density of the effect's fitting coordinates, with the factor (2 pi)^(k/2) of Laplace's
-        method; prior precision (inverse variance) by coordinate name; and largest relative change of |K| by the effect.
+        method; prior precision (inverse variance) by coordinate name; and largest relative change of |K| due to the
+        effect.
 
     Notes:
-        The relative change of |K| by the effect's amount is log-uniform from the smallest size of `priors.SIZES`. A
-        shape parameter is uniform over the range that the tests could show; for a shape at an end of this range, the
-        slope of the likelihood sets the effective width. For an effect that replaces a branch, each parameter beyond
-        the two of the branch is uniform over a factor of 20.
+        The relative change of |K| due to the effect is log-uniform from the smallest size of `priors.SIZES`. A shape
+        parameter is uniform over the range that the tests could show; for a shape at an end of this range, the slope of
+        the likelihood sets the effective width. For an effect that replaces a branch, each parameter beyond the two of
+        the branch is uniform over a factor of 20.
     """
     solution = evidence.joint or evidence.solution
     effect, names = get_effect(name), solution.coordinates.names

@@ -48,7 +48,8 @@ class ProjectedColumns:
 
     Args:
         residual: residuals in units of the scatter from point to point, (n,).
-        jacobian: derivatives of the residuals by the parameters and by the deviations of faulty parts, (k, n).
+        jacobian: derivatives of the residuals with respect to the parameters and the deviations of faulty parts, (k,
+            n).
         precision: prior precision of each row of the Jacobian, 0 for a flat prior, (k,).
         rig: errors of the rig. Each of its noise cases assumes a size of these errors and of the compound's deviation
             from the model's laws.

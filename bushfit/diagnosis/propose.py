@@ -181,8 +181,8 @@ def sensitivity(
         effect: the missing effect.
 
     Returns:
-        Sets of shape parameters by name, and the change of the n whitened residuals by a typical amount of the effect
-        for each set, (shapes, n).
+        Sets of shape parameters by name, and the change of the n whitened residuals due to a typical amount of the
+        effect for each set, (shapes, n).
     """
     bare, model = model, model.with_effect(effect.name)
     axes = {

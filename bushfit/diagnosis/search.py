@@ -314,7 +314,7 @@ def _modulus_deviation(evidence: Evidence) -> float:
 
 
 def _record_change(base: Evidence, corrected: Evidence) -> float:
-    """Largest relative change of a recorded stiffness (complex), amplitude or frequency by a correction of the record.
+    """Largest relative change of a recorded stiffness (complex), amplitude or frequency in a correction of the record.
 
     The value is 1 if the dimensions of the bushing or the direction of a test are corrected.
 

@@ -253,8 +253,10 @@ class Branch(Effect):
     Args:
         modulus: (values, omega [rad/s], strain amplitude) -> complex modulus s~ / (2 e~) of the first harmonic [Pa].
         stress: (values, strain history) -> stress [Pa].
-        modulus_sensitivities: derivatives of the modulus by the branch's parameters; None for numerical derivatives.
-        stress_sensitivities: derivatives of the stress by the branch's parameters; None for numerical derivatives.
+        modulus_sensitivities: derivatives of the modulus with respect to the branch's parameters; None for numerical
+            derivatives.
+        stress_sensitivities: derivatives of the stress with respect to the branch's parameters; None for numerical
+            derivatives.
         uses: names of the paper's parameters that the branch reads.
         size: name of the parameter that the modulus of a linear viscoelastic branch is proportional to, so that Maxwell
             arms can replace the branch; None for other branches.

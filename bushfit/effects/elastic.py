@@ -25,7 +25,7 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
 
 
 def modulus_sensitivities(p: Values, omega: Array, strain: Array) -> dict[str, Array]:
-    """Derivatives of the complex modulus of the elastic branch by its parameters.
+    """Derivatives of the complex modulus of the elastic branch with respect to its parameters.
 
     Args:
         p: parameter values by name: static shear modulus mu [Pa].
@@ -57,7 +57,7 @@ def stress(p: Values, history: History) -> Array:
 
 
 def stress_sensitivities(p: Values, history: History) -> dict[str, Array]:
-    """Derivatives of the stress of the elastic branch by its parameters.
+    """Derivatives of the stress of the elastic branch with respect to its parameters.
 
     Args:
         p: parameter values by name: static shear modulus mu [Pa].

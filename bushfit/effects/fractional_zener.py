@@ -18,7 +18,7 @@ def _scaled(p: Values) -> Array:
 
 
 def modulus(p: Values, omega: Array, strain: Array) -> Array:
-    """Change of the springpot's complex modulus by a spring in series, which limits it at high frequency.
+    """Change of the springpot's complex modulus due to a spring in series, which limits the modulus at high frequency.
 
     Args:
         p: parameter values by name: c [1], modulus of the springpot over that of the spring at 25 Hz; and of the
@@ -53,7 +53,7 @@ def _circle(length: int) -> tuple[Array, Array]:
 
 
 def stress(p: Values, history: History) -> Array:
-    """Change of the springpot's stress by a spring in series.
+    """Change of the springpot's stress due to a spring in series.
 
     Args:
         p: parameter values by name: c [1], modulus of the springpot over that of the spring at 25 Hz; and of the

@@ -3,9 +3,9 @@
 Source: Garcia Tarrago et al. 2007, Eq. 5; M. Berg, Vehicle System Dynamics 30 (1998) 197-212.
 
 Notes:
-    With u = s_f / sigma_fmax, sgn = sign(de/dt) and d = |e - e_s| / eps_half counted from the last turning point
-    (e_s, u_s), Eq. (5) reads u = u_s + sgn d v / (v + d), v = 1 - sgn u_s. Only d holds eps_half, and sigma_fmax is a
-    factor. So u is computed from one turning point to the next, with its derivative by eps_half in closed form.
+    With u = s_f / sigma_fmax, sgn = sign(de/dt) and d = |e - e_s| / eps_half counted from the last turning point (e_s,
+    u_s), Eq. (5) reads u = u_s + sgn d v / (v + d), v = 1 - sgn u_s. Only d holds eps_half, and sigma_fmax is a factor.
+    So u is computed from one turning point to the next, with its derivative with respect to eps_half in closed form.
 """
 
 from collections.abc import Sequence
@@ -67,7 +67,7 @@ def harmonic_shape(x: Array) -> Array:
 
 
 def harmonic_slope(x: Array, shape: Array) -> Array:
-    """Derivative of the friction loop's complex first harmonic h by the relative strain amplitude x.
+    """Derivative of the friction loop's complex first harmonic h with respect to the relative strain amplitude x.
 
     Args:
         x: strain amplitude over eps_half, any shape.
@@ -149,7 +149,7 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
 
 
 def modulus_sensitivities(p: Values, omega: Array, strain: Array) -> dict[str, Array]:
-    """Derivatives of the complex modulus of the friction branch by its parameters.
+    """Derivatives of the complex modulus of the friction branch with respect to its parameters.
 
     Args:
         p: parameter values by name: largest friction stress sigma_fmax [Pa], strain eps_half [1] that develops half.
@@ -190,7 +190,7 @@ def _stroke(start: Any, sign: Any, distance: Any) -> tuple[Any, Any, Any]:
 
 
 def _stroke_slopes(sign: Any, distance: Any, room: Any, reach: Any) -> tuple[Any, Any]:
-    """Derivatives of the relative friction stress u along a stroke by its start value u_s and by the distance d.
+    """Derivatives of the relative friction stress u along a stroke with respect to its start value u_s and distance d.
 
     Args:
         sign: +1 or -1, direction of the stroke.
@@ -209,7 +209,8 @@ def _strokes(senses: Sequence[Any], distances: Sequence[Any], u: Any) -> list[tu
         u: relative stress at the first turning point.
 
     Returns:
-        For each turning point: u, du/d(ln eps_half) for a fixed start value, and the derivative by the start value.
+        For each turning point: u, du/d(ln eps_half) for a fixed start value, and the derivative with respect to the
+        start value.
     """
     path = [(u, 0.0 * u, 1.0 + 0.0 * u)]
     for sense, distance in zip(senses, distances, strict=True):
@@ -298,7 +299,7 @@ def stress(p: Values, history: History) -> Array:
 
 
 def stress_sensitivities(p: Values, history: History) -> dict[str, Array]:
-    """Derivatives of the stress of the friction branch by its parameters.
+    """Derivatives of the stress of the friction branch with respect to its parameters.
 
     Args:
         p: parameter values by name: largest friction stress sigma_fmax [Pa], strain eps_half [1] that develops half.

@@ -12,7 +12,7 @@ from bushfit.effects.maxwell import relax
 
 
 def _leak(p: Values, omega: Array) -> Value:
-    """Relative change [1] of the force by the leak: -1/(1 + i omega T), 1/T = 2 pi corner; 0 if the corner is 0 Hz."""
+    """Relative change [1] of the force due to the leak: -1/(1 + i omega T), 1/T = 2 pi corner; 0 at corner 0 Hz."""
     rate = 2.0 * np.pi * p["corner"] + 0j
     total = rate + 1j * np.asarray(omega)
     return -rate / np.where(total == 0.0, 1.0, total)

@@ -36,7 +36,7 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
 
 
 def modulus_sensitivities(p: Values, omega: Array, strain: Array) -> dict[str, Array]:
-    """Derivatives of the complex modulus of the springpot by its parameters.
+    """Derivatives of the complex modulus of the springpot with respect to its parameters.
 
     Args:
         p: parameter values by name: springpot constant m [Pa s^alpha], order alpha [1].
@@ -118,7 +118,7 @@ def stress(p: Values, history: History) -> Array:
 
 
 def stress_sensitivities(p: Values, history: History) -> dict[str, Array]:
-    """Derivatives of the stress of the springpot by its parameters.
+    """Derivatives of the stress of the springpot with respect to its parameters.
 
     Args:
         p: parameter values by name: springpot constant m [Pa s^alpha], order alpha [1].
@@ -128,7 +128,7 @@ def stress_sensitivities(p: Values, history: History) -> dict[str, Array]:
         Derivatives by parameter name, each (..., n) [Pa per unit of the parameter].
 
     Notes:
-        For a steady cycle harmonic by harmonic; from rest, the derivative by alpha is a finite difference.
+        For a steady cycle harmonic by harmonic; from rest, the derivative with respect to alpha is a finite difference.
     """
     if not history.periodic:
         alpha = p["alpha"]

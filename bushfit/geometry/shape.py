@@ -45,7 +45,7 @@ class Correction(NamedTuple):
     softening: float
 
     def stiffness_decrease(self, mu: float) -> float:
-        """Relative decrease of the radial stiffness by a bulk modulus of 2 GPa, for a shear modulus `mu` [Pa].
+        """Relative decrease of the radial stiffness due to a bulk modulus of 2 GPa, for a shear modulus `mu` [Pa].
 
         Notes:
             The compliance of the volume is added to that of incompressible rubber. This is within 0.01 of finite

@@ -257,7 +257,7 @@ def _fit(
     unit = np.abs(target).mean()
 
     def parts(x: Array) -> tuple[Array, Array]:
-        """Modulus of each arm relative to the total, and its derivative by the log of its time, (n, k) each."""
+        """Modulus of each arm relative to the total, and its derivative with respect to ln(time), (n, k) each."""
         turn = 1j * omega[:, None] * np.exp(x[count:])
         basis = turn / (1.0 + turn)
         # a step that goes too far is held, as `exp` would overflow

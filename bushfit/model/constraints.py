@@ -156,7 +156,7 @@ class Constraints:
         return tied
 
     def slopes(self, values: Mapping[str, float], names: Sequence[str]) -> Array:
-        """Derivatives of the t tied parameters by other parameters, by complex steps.
+        """Derivatives of the t tied parameters with respect to other parameters, by complex steps.
 
         Args:
             values: parameter values [SI] by name.

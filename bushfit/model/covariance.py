@@ -48,8 +48,9 @@ class Covariance:
     def root(self) -> Array:
         """Square root of the covariance: matrix B with B B^T equal to the covariance, (k, k).
 
-        Notes: |B^T slope| is the standard error of a quantity with the derivatives `slope` by the parameters, (k,).
-        Unlike sqrt(slope^T C slope), it is never the root of a negative number for an ill-conditioned covariance C.
+        Notes: |B^T slope| is the standard error of a quantity whose derivatives with respect to the parameters are
+        `slope`, (k,). Unlike sqrt(slope^T C slope), it is never the root of a negative number for an ill-conditioned
+        covariance C.
         """
         sigma = np.sqrt(np.diag(self.matrix))
         safe = np.where(sigma > 0.0, sigma, 1.0)
@@ -60,7 +61,7 @@ class Covariance:
         """Half widths of the 95 % intervals of n quantities, (n,), by Student's t.
 
         Args:
-            slopes: derivatives of each quantity by each parameter, (k, n).
+            slopes: derivatives of each quantity with respect to each parameter, (k, n).
         """
         return stdtrit(self.freedom(slopes), 0.975) * np.linalg.norm(self.root.T @ slopes, axis=0)
 
@@ -79,13 +80,13 @@ class Covariance:
         return unknown and f"the tests leave {unknown} open (unknown by 100 % or more)"
 
     def freedom(self, slopes: Array) -> Array:
-        """Effective degrees of freedom of the variances of n quantities, (n,).
+        """Effective degrees of freedom of the variances of n quantities, (n,), for Student's t.
 
         Args:
-            slopes: derivatives of each quantity by each parameter, (k, n).
+            slopes: derivatives of each quantity with respect to each parameter, (k, n).
 
-        Notes: by Satterthwaite (1946): 2 v^2/var(v), where v is the variance of the quantity and var(v) is the sum of
-        squares of the changes of v by each matrix in `spread`.
+        Notes: by Satterthwaite (1946), 2 v^2/var(v), where v is the variance of the quantity and var(v) the variance of
+        the estimated v: the sum of the squared changes of v over the matrices in `spread`.
         """
         variance = np.sum(np.square(self.root.T @ slopes), axis=0)
         changes = [np.sum(slopes * (part @ slopes), axis=0) for part in self.spread]

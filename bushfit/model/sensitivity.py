@@ -33,7 +33,7 @@ def stiffness_and_slopes(
     kind: Kind = "sweep",
     conditions: RubberConditions = UNKNOWN,
 ) -> tuple[Array, Array]:
-    """Complex dynamic stiffness of a model and its derivatives by parameters, for the Jacobian of a fit.
+    """Complex dynamic stiffness of a model and its derivatives with respect to parameters, for the Jacobian of a fit.
 
     Args:
         model: model; the derivatives are taken at its parameter values.
@@ -67,7 +67,7 @@ def stiffness_and_slopes(
 def force_and_slopes(
     model: Model, direction: Place, displacement: History, names: Sequence[str], conditions: RubberConditions = UNKNOWN
 ) -> tuple[Array, Array]:
-    """Force of a loop over time and its derivatives by parameters, for the Jacobian of a fit.
+    """Force of a loop over time and its derivatives with respect to parameters, for the Jacobian of a fit.
 
     Args:
         model: model; the derivatives are taken at its parameter values.
@@ -86,7 +86,7 @@ def force_and_slopes(
 
 
 def force_slopes_of_branches(model: Model, direction: Place, displacement: History, names: Sequence[str]) -> Array:
-    """Derivatives by parameters of the force of a model of branches alone, which do not need the force itself.
+    """Derivatives of the force with respect to parameters, for a model that consists of branches alone.
 
     Args:
         model: model without modifiers and layers.
@@ -113,10 +113,10 @@ def _add_slopes(
     sensitivities: Callable[..., dict[str, Array]] | None,
     test: tuple[object, ...],
 ) -> None:
-    """Add the derivatives of a branch's response by the named parameters to the derivatives of the whole response.
+    """Add the derivatives of a branch's response with respect to the named parameters to those of the whole response.
 
     Args:
-        slopes: derivatives by parameter, changed in place, (len(names), n).
+        slopes: derivatives with respect to each parameter, changed in place, (len(names), n).
         model: model; the derivatives are taken at its parameter values.
         names: names of the parameters.
         branch: effect that adds a stress.
@@ -140,15 +140,15 @@ def _add_slopes(
 def differences(
     model: Model, names: Sequence[str], respond: Callable[[Values], Array], place: Place | None = None
 ) -> tuple[Array, Array]:
-    """Response of a model and its derivatives by parameters, by one-sided differences that stay inside the bounds.
+    """Response of a model and its derivatives with respect to parameters, by one-sided differences inside the bounds.
 
     Args:
         model: model; the derivatives are taken at its parameter values.
         names: names of k parameters.
         respond: function from parameter values to the response, (..., n), called once; the values are numbers, or
             arrays with one more entry than there are derivatives to compute.
-        place: direction or specimen of the response; derivatives by parameters of other directions, such as
-            `stiffness_factor.radial`, are 0 and are not computed. None to compute all.
+        place: direction or specimen of the response; derivatives with respect to parameters of other directions, such
+            as `stiffness_factor.radial`, are 0 and are not computed. None to compute all.
 
     Returns:
         Response, (n,), and its derivatives per SI unit of each parameter, (k, n).

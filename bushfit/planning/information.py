@@ -1,10 +1,10 @@
 """Fisher information of tests on the parameters of a model: inner products that add up over tests.
 
 Notes:
-    A column is the derivative of all residuals by a parameter, or their change by an effect; whitened means divided by
-    the noise. The stiffness is computed once at all operating points of a direction. Each run then takes its points,
-    whitened as in a fit, which treats errors shared by all points of a run as noise. Errors shared by all runs of a
-    test remain as columns of unit gain and unit phase until the runs of the test are added up.
+    A column is the derivative of all residuals with respect to a parameter, or their change due to an effect; whitened
+    means divided by the noise. The stiffness is computed once at all operating points of a direction. Each run then
+    takes its points, whitened as in a fit, which treats errors shared by all points of a run as noise. Errors shared by
+    all runs of a test remain as columns of unit gain and unit phase until the runs of the test are added up.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ ROWS_PER_CYCLE = 1000
 class Information(NamedTuple):
     """Fisher information of alternative choices of tests on k parameters and e departures from the model.
 
-    A departure is the change of the residuals by a missing effect of typical amount, or by a rival model.
+    A departure is the change of the residuals due to a missing effect of typical amount, or due to a rival model.
 
     Args:
         products: inner products of the parameter columns with the columns of parameters and departures, (choices, k,
@@ -65,8 +65,8 @@ class ModelInformation:
         products: inner products of the first 2 + k columns with all columns, (tests, 2 + k, 2 + k + e). The columns
             are unit gain error, unit phase error, k parameters, and e departures (missing effects or rival models).
         squares: inner product of the column of each departure with itself, (tests, e).
-        class_ratios: largest change of the response by each departure at any point of a test, relative to the accuracy
-            class, (tests, e).
+        class_ratios: largest change of the response due to each departure at any point of a test, relative to the
+            accuracy class, (tests, e).
         level: standard deviations of the gain [1] and phase [rad] errors that all runs of a test share, the accuracy
             class of the rig, (2,).
         prior: information matrix of the parameters' relative changes before the tests, (k, k).
@@ -240,7 +240,7 @@ class CandidateGrid:
         Effects of the order or temperature of tests, and effects without a small amount, are left out.
 
         Returns:
-            The e effects, and the change of the n residuals by a typical amount of each, (e, n).
+            The e effects, and the change of the n residuals due to a typical amount of each, (e, n).
         """
         model, places = self.knowledge.model, shared_labels(test.direction for test in self.tests)
         effects, columns = list[Effect](), [np.empty((0, sum(data_set.size for data_set in self.data_sets)))]
@@ -259,7 +259,7 @@ def relative_slopes(knowledge: Knowledge, data_sets: Sequence[MeasuredTest]) -> 
         data_sets: tests with n residuals together.
 
     Returns:
-        Derivatives, (k + b, n); the last b are by the change of a bounded parameter in units of its typical value.
+        Derivatives, (k + b, n); the last b are with respect to bounded parameters in units of their typical values.
     """
     model, bounded = knowledge.model, Coordinates.of_parameters(knowledge.model, knowledge.bounded)
     typical = np.array([parameter.typical for parameter in bounded.parameters]) / bounded.slopes(model.values)

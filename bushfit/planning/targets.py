@@ -32,8 +32,8 @@ class PlannedQuantity:
     Args:
         name: "mu", "stiffness.axial" or "loss_factor.axial".
         value: value at each point that makes relative errors absolute: the loss factor; 1 for other quantities, (n,).
-        rows: derivatives of ln|K|, of the phase [rad] for a loss factor, or of the logarithm of a parameter, by the
-            relative change of each parameter, (n, k).
+        rows: derivatives of ln|K|, of the phase [rad] for a loss factor, or of the logarithm of a parameter, with
+            respect to the relative change of each parameter, (n, k).
         scale: relative change of the quantity per change of the phase: (1 + loss^2)/loss for a loss factor; 1 for other
             quantities, (n,).
         model_error: standard error due to the model error, which no test lowers, (n,).

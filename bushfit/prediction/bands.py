@@ -123,8 +123,8 @@ class Uncertainty:
 
         Args:
             value: the quantity, (n,).
-            slopes: derivatives by the k uncertain parameters, then changes by one standard deviation of each of the e
-                errors of the model, (k + e, n).
+            slopes: derivatives with respect to the k uncertain parameters, then changes due to one standard deviation
+                of each of the e errors of the model, (k + e, n).
         """
         count = len(self.covariance.names)
         half = np.hypot(

@@ -134,8 +134,8 @@ def quantities_of(result: Result, rows: Sequence[tuple[str, str | None]], omega:
         omega: angular frequency of the moduli [rad/s].
 
     Returns:
-        Quantities, or their logarithms if they are positive, (r,), and their derivatives by the k parameters of the
-        covariance, (r, k).
+        Quantities, or their logarithms if they are positive, (r,), and their derivatives with respect to the k
+        parameters of the covariance, (r, k).
     """
     values, names = result.model.values, list(result.covariance.names)
     quantities, slopes = np.empty(len(rows)), np.zeros((len(rows), len(names)))

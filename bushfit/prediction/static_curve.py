@@ -34,7 +34,8 @@ class StaticCurve:
         displacement: displacements from the lowest to the highest [m, rad or 1], (n,).
         loading, unloading: force with rising and with falling displacement [N, N m or Pa].
         mean: mean of loading and unloading, the static curve.
-        slope: derivative of the mean by displacement, the static stiffness at each displacement [N/m, N m/rad or Pa].
+        slope: derivative of the mean with respect to displacement: the static stiffness at each displacement [N/m, N
+            m/rad or Pa].
         secant: static stiffness from end to end, (1,) [N/m, N m/rad or Pa].
         rate: rate of the motion [m/s, rad/s or 1/s].
         warnings: sentences on extrapolation, and on alternatives without a law in time.
@@ -140,7 +141,7 @@ def _forces(
         conditions: temperature and preload of the rubber.
 
     Returns:
-        Loading force, unloading force, their mean, its slope (derivative by displacement), (n,) each, and secant, (1,).
+        Loading force, unloading force, their mean and its slope (d mean/d displacement), (n,) each, and secant, (1,).
     """
     strokes = np.linspace(displacement[0], displacement[-1], _SAMPLES * (_POINTS - 1) + 1)
     frequency = rate / (4.0 * displacement[-1])

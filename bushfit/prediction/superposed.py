@@ -92,7 +92,7 @@ def superposed_stiffness_and_slopes(
     names: Sequence[str],
     conditions: RubberConditions,
 ) -> tuple[Array, Array]:
-    """Complex stiffness of a small harmonic on a large motion, and its derivatives by parameters.
+    """Complex stiffness of a small harmonic on a large motion, and its derivatives with respect to parameters.
 
     Args:
         model: model; the derivatives are taken at its parameter values.
