@@ -1,4 +1,4 @@
-"""Prediction against measurement: misfit of a model in each test and run, and its expected error in each direction.
+"""Compare a model with measurements: its misfit in each test and run, and its expected error in each direction.
 
 Each test and each run has its own figures, so that the thousands of rows of a loop do not hide a sweep that is missed.
 """
@@ -56,7 +56,7 @@ class LeaveOut:
 
     @classmethod
     def from_fit(cls, jacobian: Array, residual: Array) -> "LeaveOut":
-        """Build the linearised fit from its whitened residuals, (n,), and their Jacobian by fit coordinate, (k, n).
+        """Build the linearised fit from its whitened residuals, (n,), and their derivatives by fit coordinate, (k, n).
 
         Combinations of parameters that even all rows together do not determine are kept unchanged.
         """
@@ -95,8 +95,8 @@ class LeaveOut:
 
         Notes:
             The residuals in units of noise have the covariance 1 + J C J^T, with the robust covariance C = A^-1 M A^-1
-            of the fit to the other rows, where M sums the scores of each cluster (Liang and Zeger 1986, sandwich).
-            C is never below the covariance by noise alone, in any direction.
+            of the fit to the other rows, where M sums the scores of each cluster (Liang and Zeger 1986, sandwich). C is
+            never smaller, in any direction, than the covariance that noise alone causes.
         """
         step, out = self._basis_step(rows) * stepped, self.basis[rows]
         plain = self.residual[rows] + out @ step
@@ -111,7 +111,7 @@ class LeaveOut:
         return plain, plain - directions @ ((1.0 - 1.0 / np.hypot(1.0, scale)) * (directions.T @ plain))
 
     def noise_gradient(self, rows: Array, predicted: Array) -> Array:
-        """Derivatives of half the sum of squares of the predicted residuals with respect to the noise of each row.
+        """Derivatives of half the sum of squared predicted residuals with respect to the noise of each row.
 
         The noise acts directly on held-out rows, and on the others through the parameters that they determine.
 
@@ -175,12 +175,12 @@ def misfits(model: Model, fitted: Sequence[MeasuredTest], unfitted: Sequence[Mea
 def expected_errors(
     model: Model, fitted: Sequence[MeasuredTest], unfitted: Sequence[MeasuredTest] = (), fit: FitResult | None = None
 ) -> tuple[ExpectedError, ...]:
-    """Expected error of a fitted model in stiffness and loss factor: 95 % of the points of a direction have less.
+    """Expected errors of a fitted model in stiffness and loss factor: limits for 95 % of the points of a direction.
 
-    Each run of a fitted test is held out, and predicted from the fit to the other runs, if these determine all
-    parameters and change none by much; a test that was not fitted is always a prediction. If fewer than half the points
-    of a direction can be predicted, the errors of the fit itself at all its points are used; a direction with very few
-    of them is left out.
+    Each run of a fitted test is held out and predicted by a fit to the other runs, if the other runs determine all
+    parameters and change no parameter by much. Tests that were not fitted are predictions already. If fewer than half
+    the points of a direction can be predicted, the errors of the fit at all its points are used. A direction with very
+    few points is left out.
 
     Args:
         model: fitted model.
@@ -223,13 +223,13 @@ def prior_uses(solution: FitResult, covariance: Covariance) -> dict[str, PriorUs
         covariance: covariance of the fitted parameters.
 
     Returns:
-        By name of the parameter, the share of the information that comes from the prior, and the distance of the tests
-        from it in standard deviations.
+        By name of the parameter, the share of the information that comes from the prior, and the distance between the
+        tests and the prior in standard deviations.
 
     Notes:
-        With the variance S of the prior, the variance V of the estimate and v of the same estimate if the weights of
-        the fit are right, v/S is the weight of the prior. If prior and tests agree, the estimate differs from the mean
-        of the prior with the variance V + S - 2 v, which is S - v for right weights.
+        Let S be the variance of the prior, V that of the estimate, and v that of the estimate if the weights of the fit
+        are right. Then v/S is the weight of the prior. If prior and tests agree, the estimate differs from the mean of
+        the prior with the variance V + S - 2 v, which is S - v for right weights.
     """
     moving, model = solution.moving, solution.model
     names, uses = [solution.names[i] for i in moving], dict[str, PriorUse]()
@@ -267,7 +267,7 @@ def prior_warnings(uses: Mapping[str, PriorUse]) -> list[str]:
 
 
 def _errors_by_direction(parts: Sequence[tuple[str, Array, bool]]) -> tuple[ExpectedError, ...]:
-    """Expected error of each direction, from its predicted points if these are at least half, else from all its points.
+    """Expected error of each direction, from its predicted points if they are at least half, else from all its points.
 
     Args:
         parts: name of a direction or specimen; absolute relative difference of |K| and absolute difference of the loss
@@ -296,8 +296,9 @@ def _runs(test: MeasuredTest) -> Iterator[tuple[dict[str, Any], Array]]:
     """Yield the runs of a test: the points of a sweep at each constant amplitude or frequency.
 
     Yields:
-        Constant quantity of the run, with the keys held (its name), value and unit; and the mask of the points of the
-        run, (n,). A loop, and a sweep without a constant quantity, are one run with no keys.
+        Constant quantity of the run, as a dict with the keys "held" (name of the quantity), "value" and "unit"; and the
+        mask of the points of the run, (n,). A loop, and a sweep without a constant quantity, are one run with an empty
+        dict.
     """
     if not isinstance(test, MeasuredSweep) or test.sweep.stepped is None:
         yield {}, np.ones(test.frequency.size, dtype=bool)

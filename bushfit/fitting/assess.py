@@ -1,6 +1,6 @@
-"""The uncertainty of a fit and how well it meets the data: covariance, quality, range measured, lack of fit.
+"""Uncertainty and quality of a fit: covariance, agreement with the tests, measured range, lack of fit.
 
-Warnings name tests that no rubber could have given, tests at different temperatures, and tests that a fit left out.
+Warnings name tests that no rubber could produce, tests at different temperatures, and tests that a fit left out.
 """
 
 from __future__ import annotations
@@ -59,14 +59,15 @@ def covariance(
 
     Returns:
         Covariance of the parameter values in SI units. If the residuals of a stage, or of one of its tests, exceed the
-        noise, the variance that a test contributes is multiplied by the larger of the two reduced chi-squares. Errors
-        of an estimated noise are added by Kenward and Roger (1997); `spread` is their effect on the covariance itself.
+        noise, the variance that a test contributes is multiplied by the larger of the two reduced chi-squares. The
+        uncertainty of an estimated noise is added after Kenward and Roger (1997); `spread` is its effect on the
+        covariance itself.
 
     Notes:
-        Each stage solves J_own (J_own^T d_own + J_rest^T d_rest + noise) = 0 for its own parameters while the rest
-        carry their own errors. With J_own^T = Q R this is Q^T J^T d = b, cov(b) = 1, which never squares the Jacobian.
-        Stacked over the stages it is M d = b, so that cov(d) = (M^-1 B) (M^-1 B)^T with cov(b) = B B^T. Singular values
-        of M below 1/_LARGEST_ERROR are lifted to it.
+        Let d be the errors of all parameters. Each stage solves J_s (J_s^T d_s + J_r^T d_r + noise) = 0 for its
+        parameters s, while the remaining parameters r have the errors of other stages. With J_s^T = Q R this is Q^T J^T
+        d = b, cov(b) = 1, which never squares the Jacobian. Stacked over the stages it is M d = b, so that cov(d) =
+        (M^-1 B) (M^-1 B)^T with cov(b) = B B^T. Singular values of M below 1/_LARGEST_ERROR are lifted to it.
     """
     fixed, stages = fixed or Covariance(), [stage for stage in stages if stage.names]
     fixed = fixed.restricted([name for name in fixed.names if name not in model.tied])
@@ -125,16 +126,16 @@ def covariance(
 def _changes_by_noise(
     data_sets: Sequence[MeasuredTest], influence: Array, basis: Array
 ) -> dict[Hashable, tuple[Array, Array]]:
-    """Changes of the covariance by errors of the estimated noise variances, by identifier of the noise variance.
+    """Changes of a covariance due to errors of the estimated noise variances, by identifier of the variance.
 
     Args:
         data_sets: tests of one fit.
-        influence: change of each of the k parameters by a unit of each of the n whitened residuals, (k, n).
+        influence: change of each of the k parameters per unit of each of the n whitened residuals, (k, n).
         basis: r orthogonal rows that span the Jacobian of the parameters of this fit, (r, n).
 
     Returns:
-        By noise variance: change of the covariance by one standard error of the noise variance, and the covariance
-        that the wrong weights of the fit add, (k, k) each.
+        For each noise variance: change of the covariance if the variance rises by one standard error, and the
+        covariance that the wrong weights of the fit add, (k, k) each.
     """
     unit, sums = basis / np.linalg.norm(basis[0]), dict[Hashable, list[Array]]()
     for test, rows in zip(data_sets, residual_slices(data_sets), strict=True):
@@ -147,7 +148,7 @@ def _changes_by_noise(
 
 
 def _inverse(system: Array) -> Array:
-    """Inverse of a square matrix, with singular values of at most `_LARGEST_ERROR` also if the matrix is singular."""
+    """Inverse of a square matrix; its singular values are limited to `_LARGEST_ERROR`, for singular matrices."""
     left_vectors, values, right_vectors = np.linalg.svd(system)
     return (right_vectors.T / np.maximum(values, 1.0 / _LARGEST_ERROR)) @ left_vectors.T
 
@@ -155,10 +156,10 @@ def _inverse(system: Array) -> Array:
 def linear_errors(slope: Array) -> Array:
     """Standard errors of k parameters in their dimensionless coordinates (mostly ln value), (k,).
 
-    The noise is assumed known and the model correct; `covariance` adds the errors of both.
+    The noise is assumed to be known and the model to be correct; `covariance` makes neither assumption.
 
     Args:
-        slope: derivatives of the n whitened residuals by the coordinates, (k, n).
+        slope: derivatives of the n whitened residuals with respect to the coordinates, (k, n).
     """
     return np.linalg.norm(_inverse(np.linalg.qr(slope.T)[1]), axis=1)
 
@@ -188,15 +189,15 @@ def lack_of_fit(model: Model, data_sets: Sequence[MeasuredTest], parameters: int
 
 
 def excess_chi_square(chi_square: float, freedom: int) -> float | None:
-    """Return the reduced chi-square `chi_square` if it exceeds 1 by more than noise explains; otherwise None.
+    """Return the reduced `chi_square` if it exceeds 1 by more than noise explains; otherwise None.
 
-    Noise explains 5 standard deviations, for the degrees of freedom `freedom`.
+    The limit is 5 standard deviations of a reduced chi-square with `freedom` degrees of freedom.
     """
     return chi_square if chi_square > 1.0 + _LACK_OF_FIT * np.sqrt(2.0 / freedom) else None
 
 
 def misfit_warnings(model: Model, data_sets: Sequence[MeasuredTest], parameters: int, advice: str = "") -> list[str]:
-    """Warning that the model misses all tests together, or one test, by more than the noise; none if it does not.
+    """Warning that the model misses all tests together, or one test, by more than the noise.
 
     Args:
         model: fitted model.
@@ -205,7 +206,7 @@ def misfit_warnings(model: Model, data_sets: Sequence[MeasuredTest], parameters:
         advice: text to append to the sentence.
 
     Returns:
-        The sentence, or an empty list.
+        List with the sentence; empty if the model fits.
     """
     chi_square, freedom = reduced_chi_square(model, data_sets, parameters)
     by_test = {test.name: lack for test in data_sets if (lack := lack_of_fit(model, [test], 0)) is not None}
@@ -262,8 +263,8 @@ def preload_ranges(data_sets: Sequence[MeasuredTest]) -> list[PreloadRange]:
     """Ranges of preload of the directions and specimens that were tested at two preloads or more.
 
     Returns:
-        For each of them the smallest and largest preload [m, rad, N or N m], and the number of preloads; none for a
-        direction whose preloads are displacements in some tests and forces in others.
+        For each direction or specimen, the smallest and largest preload [m, rad, N or N m] and the number of preloads.
+        A direction whose preloads are displacements in some tests and forces in others is left out.
     """
     ranges = []
     for place in dict.fromkeys(test.direction for test in data_sets):
@@ -275,7 +276,7 @@ def preload_ranges(data_sets: Sequence[MeasuredTest]) -> list[PreloadRange]:
 
 
 def implausible_modulus(bushing: Bushing | None, data_sets: Sequence[MeasuredTest]) -> list[str]:
-    """Warning about shear moduli that no rubber has, or that differ too much between tests, usually by a wrong unit.
+    """Warning about shear moduli that no rubber has or that differ too much between tests, usually due to a wrong unit.
 
     Returns:
         At most one sentence.

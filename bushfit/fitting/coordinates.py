@@ -1,7 +1,7 @@
 """Dimensionless coordinates of fitted parameters, and their bounds and priors in these coordinates.
 
-A fit moves the logarithm of strictly positive parameters and the others in units of their typical size, so that every
-coordinate is of order one.
+The coordinate of a strictly positive parameter is its logarithm; the coordinate of any other parameter is its value
+divided by a typical value. So every coordinate is of order one.
 """
 
 from collections.abc import Mapping, Sequence
@@ -58,13 +58,13 @@ class Coordinates:
         }
 
     def slopes(self, values: Mapping[str, float]) -> Array:
-        """Derivatives of the k parameter values [SI] by their coordinates, (k,), at values by name."""
+        """Derivatives of k parameter values [SI] with respect to their coordinates, (k,), at values by name."""
         pairs = zip(self.names, self.parameters, strict=True)
         return np.array([values[name] if parameter.log else parameter.typical for name, parameter in pairs])
 
 
 def relative_sizes(model: Model, names: Sequence[str]) -> Array:
-    """Derivative of each parameter's fit coordinate by its relative change dp/p, (k,): 1 if the coordinate is ln p."""
+    """Change of each parameter's fit coordinate per relative change dp/p of the parameter, (k,): 1 if it is ln p."""
     pairs = [(model.parameters[name], abs(model.values[name])) for name in names]
     return np.array(
         [1.0 if parameter.log else max(value / parameter.typical, _LEAST_SIZE) for parameter, value in pairs]
@@ -82,7 +82,7 @@ def coordinate_bounds(coordinates: Coordinates, bounds: Bounds) -> tuple[Array, 
 
 
 def prior_rows(model: Model, names: Sequence[str]) -> tuple[Array, Array]:
-    """Whitened residuals of a model's priors, and their derivatives by parameter coordinate.
+    """Whitened residuals of a model's priors, and their derivatives with respect to the parameter coordinates.
 
     A prior is normal in the coordinates, so a strictly positive parameter has a log-normal prior.
 
@@ -113,9 +113,9 @@ def prior_covariance(prior: Prior, coordinates: Coordinates) -> Array:
 
 
 def coordinate_changes(model: Model, names: Sequence[str], changed: Sequence[str]) -> Array:
-    """Derivatives of parameter coordinates by the coordinates of the free parameters, for the chain rule with ties.
+    """Derivatives of parameter coordinates with respect to free parameters' coordinates, for the chain rule with ties.
 
-    A free parameter has derivative 1 by itself and 0 by the others; a tied parameter follows those in its formula.
+    A free parameter changes only with its own coordinate; a tied parameter changes with those in its formula.
 
     Args:
         model: model with its ties.

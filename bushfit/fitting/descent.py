@@ -8,9 +8,9 @@ Notes:
     parameters is solved for again.
 
     Correlated parameters make chi-square a narrow curved valley, in which straight steps are short. A step in nearly
-    the same direction as the last one is therefore bent by the second derivative measured over the last step: geodesic
-    acceleration (M. K. Transtrum, J. P. Sethna, arXiv:1201.5885, 2012), without additional evaluations. On four
-    campaigns whose misfit no effect explains, it saved 4 to 29 % of all evaluations of the diagnosis.
+    the same direction as the last step therefore gets a correction from the second derivative measured over the last
+    step: geodesic acceleration (M. K. Transtrum, J. P. Sethna, arXiv:1201.5885, 2012), without additional evaluations.
+    On four campaigns whose misfit no effect explains, it saved 4 to 29 % of all evaluations of the diagnosis.
 """
 
 from dataclasses import dataclass, replace
@@ -59,7 +59,7 @@ class Descent:
         model: best model so far.
         point: coordinates of its k fitted parameters, (k,).
         residual: whitened residuals of the best model, (n,).
-        jacobian: derivatives of the residuals by coordinate, (k, n).
+        jacobian: derivatives of the residuals with respect to the coordinates, (k, n).
         tolerance: expected relative fall of chi-square below which the fit has converged; None for an absolute fall of
             0.01, which is fine enough to compare models.
         evaluations: number of model evaluations so far.
@@ -86,7 +86,7 @@ class Descent:
         """Start a fit at the start values of its problem, before the first step.
 
         Args:
-            problem: parameters to fit, tests and bounds; a fit without parameters is at its end.
+            problem: parameters to fit, tests and bounds; a fit without parameters has converged.
             tolerance: expected relative fall of chi-square at which the fit ends; None for the absolute fall of 0.01.
 
         Returns:
@@ -115,7 +115,7 @@ class Descent:
 
     @property
     def expected_fall(self) -> float:
-        """Absolute fall of chi-square still to be expected until convergence, from the linearised model."""
+        """Absolute fall of chi-square expected between now and convergence, from the linearised model."""
         return max(self._step(0.0)[1], 0.0)
 
     @property
@@ -182,12 +182,12 @@ class Descent:
 
     @cached_property
     def _normal(self) -> tuple[Array, Array]:
-        """Gauss-Newton Hessian, (k, k), and gradient, (k,), of half of chi-square by the k parameter coordinates."""
+        """Gauss-Newton Hessian, (k, k), and gradient, (k,), of chi-square/2 in the k parameter coordinates."""
         return self.jacobian @ self.jacobian.T, self.jacobian @ self.residual
 
     @cached_property
     def _reach(self) -> tuple[Array, Array]:
-        """Smallest and largest coordinate of each parameter that the next step may reach, (k,) each."""
+        """Smallest and largest coordinate that each parameter may reach in the next step, (k,) each."""
         parameters, (low, high) = self.problem.coordinates.parameters, self.problem.limits
         longest = np.array([_LONGEST_STEP if parameter.log else np.inf for parameter in parameters])
         return np.maximum(low, self.point - longest), np.minimum(high, self.point + longest)
@@ -195,8 +195,9 @@ class Descent:
     def _step(self, damping: float) -> tuple[Array, float]:
         """Damped Gauss-Newton step within the bounds, and the fall of chi-square expected from the step.
 
-        A parameter that would pass a bound stops there, and the others are solved for again. A parameter at a bound
-        whose gradient points outwards does not move, nor does one to which the residuals are insensitive.
+        A parameter that would pass a bound stops at the bound, and the step of the others is solved for again. A
+        parameter at a bound whose gradient points outwards does not move, nor does a parameter without influence on the
+        residuals.
 
         Args:
             damping: damping of the step, relative to the curvature.
@@ -224,7 +225,7 @@ class Descent:
     def _bend(self, step: Array, damping: float) -> Array:
         """Second-order correction of a damped step, which bends along a curved valley of chi-square.
 
-        The curvature is known from the last successful step; if that had another direction, the correction is 0.
+        The curvature is known from the last successful step. If that step had another direction, the correction is 0.
 
         Args:
             step: damped step of the k parameter coordinates, (k,).
@@ -247,16 +248,16 @@ class Descent:
         return bend
 
     def _length(self, step: Array) -> float:
-        """Length of a step, (k,): root sum of squares of the residuals' changes by each of the k parameters alone."""
+        """Length of a step, (k,): root of the sum of squared residual changes that each parameter alone would cause."""
         return float(np.sqrt(np.diag(self._normal[0]) @ np.square(step)))
 
 
 def _solved(curvature: Array, pull: Array, free: Array) -> Array:
-    """Solve curvature @ step = pull for the free parameters, with a step of 0 along combinations that are rounding.
+    """Solve curvature @ step = pull for the free parameters; along numerically undetermined combinations the step is 0.
 
     Args:
-        curvature: Gauss-Newton Hessian by coordinate, (k, k).
-        pull: negative gradient by coordinate, (k,).
+        curvature: Gauss-Newton Hessian of chi-square/2 in the coordinates, (k, k).
+        pull: negative gradient of chi-square/2, (k,).
         free: mask of the f parameters that move, (k,).
 
     Returns:

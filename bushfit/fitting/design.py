@@ -1,4 +1,4 @@
-"""Fits of added effects, from several start values of their shapes, as one start may end in a local minimum.
+"""Fits of added effects from several start values of their shape parameters, to avoid local minima.
 
 The shape parameters of an effect are its times, gaps, orders and frequencies.
 """
@@ -114,7 +114,7 @@ def shape_start_values(data_sets: Sequence[MeasuredTest], model: Model, paramete
         parameter: shape parameter; its `scale` names the quantity of the tests that limits the range.
 
     Returns:
-        Five start values in the parameter's SI unit, (5,), or its typical value, (1,), without a scale.
+        Five start values in the parameter's SI unit, (5,); if the parameter has no `scale`, its typical value, (1,).
     """
     frequencies, strains = operating_conditions(model.bushing, data_sets)
     match parameter.scale:

@@ -1,4 +1,4 @@
-"""The discrepancy of a fitted model from its tests: a Gaussian process of its relative error, conditioned on them.
+"""Discrepancy between a fitted model and its tests: a Gaussian process of the relative error, conditioned on the tests.
 
 The process has a size (standard deviation relative to |K|) and correlation lengths (in ln frequency and ln strain).
 Both maximise the restricted likelihood, see `gaussian_process`.
@@ -49,7 +49,7 @@ class FittedTests:
 
     Args:
         solution: result of the fit, with each test whitened separately.
-        rig_errors: for each test, change of its n whitened residuals by one standard deviation of each of the w errors
+        rig_errors: for each test, change of its n whitened residuals due to one standard deviation of each of w errors
             of the rig, (w, n); empty without such errors.
     """
 
@@ -80,12 +80,12 @@ class FittedTests:
 
     @property
     def free_jacobian(self) -> Array:
-        """Derivatives of the whitened residuals by coordinate of the k parameters not at a bound, (k, n)."""
+        """Derivatives of the whitened residuals with respect to the k parameter coordinates not at a bound, (k, n)."""
         return self.solution.jacobian[self.solution.moving]
 
     @cached_property
     def slopes(self) -> Array:
-        """Derivatives of ln K at the p operating points by coordinate of the k parameters not at a bound, (k, p)."""
+        """Derivatives of ln K at the p points with respect to the k parameter coordinates not at a bound, (k, p)."""
         model, moving = self.solution.model, self.solution.moving
         names = [self.solution.names[i] for i in moving]
         slopes = np.concatenate([log_slopes(model, data_set, names) for data_set in self.data_sets], axis=-1)
@@ -93,11 +93,11 @@ class FittedTests:
 
     @cached_property
     def _blocks(self) -> list[tuple[MeasuredTest, slice, Array | None, Array]]:
-        """Tests, with the combinations of their residuals that a change of the complex stiffness changes.
+        """Tests, with the combinations of their residuals that depend on the complex stiffness.
 
         Returns:
             For each test: the test; the slice of its n residuals; the two combinations as orthonormal columns, (n, 2),
-            or None for a sweep, of which all residuals change; and their changes, (2, 2), by stiffness changes of 1
+            or None for a sweep, of which all residuals change; and their changes, (2, 2), for stiffness changes of 1
             and i [N/m or N m/rad].
         """
         units, blocks = np.array([[1.0], [1.0j]]), list[tuple[MeasuredTest, slice, Array | None, Array]]()
@@ -192,7 +192,7 @@ class Discrepancy:
         groups: groups of directions or specimens; the members of a group share one error.
         lengths: correlation lengths in ln frequency and ln strain.
         nodes: for each group, indices of the m operating points that represent the process (its nodes), (m,).
-        shapes: relative error at the operating points by each of q independent patterns of the process, (q, p).
+        shapes: relative error at the operating points in each of q independent patterns of the process, (q, p).
         sizes: candidate standard deviations of the process, relative to |K|, ascending, (s,).
     """
 
@@ -229,7 +229,7 @@ class Discrepancy:
 
     @cached_property
     def complex_shapes(self) -> Array:
-        """Relative errors of the stiffness at p operating points by each of q patterns, in phase, then in quadrature.
+        """Relative errors of the stiffness at p operating points in each of q patterns, in phase, then in quadrature.
 
         Returns:
             Complex relative errors, (2 q, p).
@@ -244,7 +244,7 @@ class Discrepancy:
 
     @cached_property
     def best(self) -> tuple[float, float]:
-        """Largest gain in log likelihood by an error of the model, and the size of this error relative to |K|."""
+        """Largest gain in log likelihood through an error of the model, and the size of this error relative to |K|."""
         gains = self.likelihood.gains(self.sizes)
         return float(gains.max()), float(self.sizes[gains.argmax()])
 
@@ -272,8 +272,8 @@ class Discrepancy:
 def averaged(processes: Sequence[Discrepancy]) -> Unnamed:
     """Average Gaussian processes of a model's error, weighted by their likelihood, to a correction of the model.
 
-    Nodes and groups are those of the likeliest process; lengths are geometric means. As few degrees of freedom
-    determine the size, standard deviations are enlarged so that a normal 95 % interval is as wide as Student's t.
+    Nodes and groups are those of the likeliest process; lengths are geometric means. Few degrees of freedom determine
+    the size, so standard deviations are enlarged until a normal 95 % interval is as wide as that of Student's t.
 
     Returns:
         Correction at the nodes, with its standard deviation, both relative to the stiffness.

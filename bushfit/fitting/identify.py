@@ -1,8 +1,8 @@
-"""Sentences on parameters that the tests do not determine: the reason, and combinations that they determine.
+"""Sentences on parameters that the tests do not determine: the reasons, and combinations that are determined.
 
 A direction is an eigenvector of the Fisher information, with parameters scaled by their size: a combination of relative
-changes. Its standard error is one over the root of the eigenvalue. A direction is open, and so are the parameters that
-it changes, if that error is above 15 %: the tests do not determine the combination.
+changes. Its standard error is one over the root of the eigenvalue. If that error is above 15 %, the tests do not
+determine the combination: the direction and the parameters that it changes are called open.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -49,7 +49,7 @@ class _Combination(NamedTuple):
         formula: formula in the names of the model's parameters.
         value: function from parameter values by name, with omega [rad/s], to the modulus [Pa]; accepts complex values.
         names: names of the parameters in the formula.
-        open_with: names of parameters; the combination is reported if one is not determined. Empty: those in `names`.
+        open_with: names of parameters; the combination is reported if one of them is not determined. Empty: `names`.
         remark: meaning of the modulus.
     """
 
@@ -156,8 +156,8 @@ def _error_directions(model: Model, data_sets: Sequence[MeasuredTest], names: Se
         names: names of the k parameters.
 
     Returns:
-        Relative change of each parameter by each of the k independent errors, (k, k), one column per error. The sum of
-        squares along a row is the variance of a parameter; their outer products are the covariance.
+        Relative change of each parameter due to each of the k independent errors, (k, k), one column per error. The sum
+        of squares along a row is the variance of a parameter; the sum of the columns' outer products is the covariance.
     """
     slopes = FitProblem(model, data_sets, names).jacobian(model, with_priors=False)
     slopes *= relative_sizes(model, names)[:, None]
@@ -224,7 +224,7 @@ def _known_combinations(
     Args:
         model: fitted model.
         data_sets: tests of the campaign.
-        rows: relative change of each parameter by each of the k independent errors, by name, (k,) each.
+        rows: relative change of each parameter due to each of the k independent errors, by parameter name, (k,) each.
         involved: names of the parameters in these moduli that the tests do not determine.
     """
     enough = min(_KNOWN, _BETTER * min(float(np.linalg.norm(rows[name])) for name in involved))

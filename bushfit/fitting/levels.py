@@ -1,4 +1,4 @@
-"""Errors shared by all runs of a level, which repeats cannot reveal: estimated from the residuals of a fit."""
+"""Estimate errors shared by all runs of a level from the residuals of a fit, because repeats cannot reveal them."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -20,12 +20,12 @@ _LEFT = 1e-6
 
 
 class LevelErrors(NamedTuple):
-    """Gain and phase errors shared by all runs of a level (one held amplitude or frequency), estimated from a fit.
+    """Gain and phase errors shared by all runs of a level (one constant amplitude or frequency), estimated from a fit.
 
     Args:
         error: standard deviation of the relative gain error, and of the phase error [rad].
         freedom: degrees of freedom behind the error; 0 if the error is fixed at the largest that a rig may have.
-        significant: True if these errors lower -2 ln(likelihood) by more than chance explains.
+        significant: True if including these errors lowers -2 ln(likelihood) by more than chance explains.
     """
 
     error: tuple[float, float]
@@ -41,7 +41,7 @@ def level_errors(
     Args:
         data_sets: fitted tests.
         residual: whitened residuals at the end of the fit, with the rows of priors, (n,).
-        absorbed: directions of the whitened residuals that fitted parameters, or a fault, can produce, (k, n).
+        absorbed: changes of the whitened residuals that fitted parameters or faults can produce, (k, n).
         maximum: largest standard deviation of gain and of phase [rad] that the rig may have.
 
     Returns:
@@ -110,7 +110,7 @@ def level_errors(
 
 
 def level_error_columns(sweep: MeasuredSweep) -> Array:
-    """Derivatives of a sweep's whitened residuals by the gain and phase error of each of its levels.
+    """Derivatives of a sweep's whitened residuals with respect to the gain and phase error of each of its levels.
 
     Returns:
         Derivatives, (2 levels, n): gain [1] and phase [rad] of the first level, then of the next.

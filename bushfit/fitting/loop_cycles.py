@@ -1,8 +1,8 @@
-"""The cycles of a loop: the steady ones, their frequency and number, and the name of the waveform.
+"""Steady cycles of a loop: their selection, frequency and number, and the name of the waveform.
 
 The longest part of constant amplitude and rate is kept; a record that is steady throughout is unchanged, so it may
-start and end anywhere in its cycle. Of a record with a hole (missing rows) only the longest part without a hole is
-kept, because the number of cycles in the hole is unknown.
+start and end anywhere in its cycle. If rows are missing, only the longest part without missing rows is kept, because
+the number of missing cycles is unknown.
 """
 
 import numpy as np
@@ -41,7 +41,7 @@ _OUTER = 0.9
 
 
 def steady_cycles(loop: Loop) -> tuple[Loop, float, float, str | None]:
-    """Find the steady cycles of a loop; if rows are missing, those of its longest part without a hole.
+    """Find the steady cycles of a loop; if rows are missing, in its longest part without a gap.
 
     Returns:
         The loop without the rows before and after its steady cycles, the frequency of its motion [Hz], the number of
@@ -120,7 +120,7 @@ def _steady_part(loop: Loop, time: Array, motion: Array) -> tuple[Loop, str | No
 
 
 def _cut(loop: Loop, first: float, last: float) -> Loop:
-    """Return a loop with only its rows from the time `first` to the time `last` [s]."""
+    """Return a loop with only its rows from the time `first` to the time `last`, both in s."""
     return loop.select(slice(np.searchsorted(loop.time, first), np.searchsorted(loop.time, last, side="right")))
 
 
@@ -200,7 +200,7 @@ def _of_one_cycle(loop: Loop, clock: Array, x: Array, crossings: Array) -> tuple
 def _period_by_ends(clock: Array, x: Array, duration: float, whole: float) -> float | None:
     """Period [s] of a motion whose last rows meet its first rows with the same slope; None if they do not.
 
-    Straight lines through both ends determine by how much the duration of the record differs from one cycle.
+    Straight lines through both ends determine how much the duration of the record differs from one cycle.
 
     Args:
         clock, x: time [s] and motion relative to its middle, (n,) each.
@@ -278,7 +278,7 @@ def waveform(coefficients: Array) -> str:
 
 
 def wrong_clock(loop: Loop, coefficients: Array) -> str | None:
-    """Note on a loop without a time column whose stated waveform is not that of its rows, sampled evenly in time.
+    """Note on a loop without a time column whose rows, if evenly spaced in time, contradict the stated waveform.
 
     Args:
         loop: steady cycles, with the time that follows from the stated waveform.

@@ -1,4 +1,4 @@
-"""The harmonics of a loop: its displacement without noise, the noise of its force, and the outliers of both.
+"""Harmonics of a loop: the displacement without noise, the noise of the force, and outliers of both.
 
 Harmonics are fitted by least squares at the recorded rows, without outliers.
 """
@@ -64,8 +64,8 @@ class LoopHarmonics(NamedTuple):
 def loop_harmonics(loop: Loop, frequency: float, cycles: float) -> LoopHarmonics:
     """Determine harmonics of displacement and force, the noise of the force, and outliers of both.
 
-    The noise is the part of the force that does not repeat from cycle to cycle or is too fast for the rubber, without
-    slow changes from one cycle to the next, which are settling or drift.
+    Noise is the part of the force that does not repeat from cycle to cycle, or is too fast for rubber. Slow changes
+    from one cycle to the next are settling or drift, and are not part of the noise.
 
     Args:
         loop: steady cycles of a loop.
@@ -128,7 +128,7 @@ def _cleared(coefficients: Array, noise: float, phase: Array, displacement: Arra
 
 
 def remove_slow_changes(phase: Array, residual: Array) -> tuple[Array, int]:
-    """Remove settling and drift, which are no noise, from residuals of the force: mean, three harmonics of each cycle.
+    """Remove settling and drift, which are not noise, from force residuals: mean and three harmonics of each cycle.
 
     Args:
         phase: position of each row [cycles], (n,).

@@ -1,4 +1,4 @@
-"""Master curve: sweeps at several temperatures as one at 23 degC over reduced frequency, and their shift factors."""
+"""Master curve: sweeps at several temperatures shifted to 23 degC over reduced frequency, and their shift factors."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -28,11 +28,12 @@ class ShiftedSweep:
     Args:
         sweep: sweep as fitted, at its own temperature.
         temperature: mean temperature of its points [K].
-        shift: natural log of the shift factor a_T by the fitted law, and its standard error; nan if unknown.
-        best_shift: ln a_T that fits this sweep best, with the moduli as fitted, and its standard error.
+        shift: natural log of the shift factor a_T of the fitted law, and its standard error; nan if unknown.
+        best_shift: ln a_T that fits this sweep best with all other parameters as fitted, and its standard error.
         reduced_frequency: frequency times a_T of each point [Hz], (n,).
-        reduced_stiffness: measured stiffness reduced to 23 degC, complex [N/m or N m/rad], (n,): multiplied by the
-            model's stiffness at 23 degC and f a_T over the model's stiffness at the conditions of the point.
+        reduced_stiffness: measured stiffness reduced to 23 degC, complex [N/m or N m/rad], (n,): the measured value
+            times the model's stiffness at 23 degC and f a_T, divided by the model's stiffness at the conditions of the
+            point.
     """
 
     sweep: MeasuredSweep

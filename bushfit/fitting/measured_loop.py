@@ -34,11 +34,11 @@ class MeasuredLoop(MeasuredBase):
     Args:
         prepared: loop prepared as an input of the model.
         fundamental_only: True to use only the first harmonic of the residuals, so that the loop is one operating point
-            with two residuals: for an added stiffness that is known at the loop's frequency only.
-        gain_error: standard deviation of the relative gain error of the whole record, by the accuracy class of its rig,
-            and of the offset of its force, relative to half the force range.
-        gain_weighs: True if the gain error is part of the noise that weights the residuals, as for a class stated in
-            [rig]. An assumed gain error only widens the errors of fitted parameters.
+            with two residuals. This is needed if a stiffness is added that is known only at the loop's frequency.
+        gain_error: standard deviation of the relative gain error of the whole record, from the accuracy class of its
+            rig; also of the offset of its force, relative to half the force range.
+        gain_weighs: True if the gain error is part of the noise by which residuals are weighted, as for a class stated
+            in [rig]. An assumed gain error only widens the errors of fitted parameters.
         first_harmonic_errs: True if the model error includes the first harmonic of the force.
 
     Notes:
@@ -107,12 +107,12 @@ class MeasuredLoop(MeasuredBase):
 
     @property
     def weights(self) -> Array:
-        """Weight of each row, (n,): 1 full, 0 left out; of a long loop the number of rows averaged in each bin."""
+        """Weight of each row, (n,): 1 full, 0 left out; for a long loop, the number of rows averaged in each bin."""
         return self.prepared.weight
 
     @property
     def relative_noise(self) -> float:
-        """Standard deviation of a row's noise relative to half the force range, or of a sweep's point to |K|."""
+        """Standard deviation of a row's noise relative to half the force range, or of a sweep point relative to |K|."""
         return self.prepared.noise / self.prepared.half_range
 
     def weighted(self, weight: Array) -> Self:
@@ -146,7 +146,7 @@ class MeasuredLoop(MeasuredBase):
         return self.whiten((self.force(model, values) - self.prepared.force) * self._per_noise)
 
     def jacobian(self, model: Model, names: Sequence[str]) -> Array:
-        """Derivatives of the whitened residuals by parameter value [SI]; the last are cached.
+        """Derivatives of the whitened residuals with respect to parameter values [SI]; the last result is cached.
 
         Returns:
             Derivatives, (len(names), size).
@@ -163,13 +163,13 @@ class MeasuredLoop(MeasuredBase):
         return self._keep("jacobian", model, tuple(names), rows)
 
     def residual_change(self, change: Array, model: Model, added: Array | float = 0.0) -> Array:
-        """Change of the whitened residuals, (..., size), by a small change of the model's stiffness.
+        """Change of the whitened residuals, (..., size), due to a small change of the model's stiffness.
 
         Args:
             change: change of the stiffness at each operating point (one in a loop, in the first harmonic of its force),
                 complex, (..., 1) [N/m or N m/rad].
             model: model whose stiffness changes.
-            added: stiffness added to the model's at the same points, complex [N/m or N m/rad]; a loop does not use it.
+            added: stiffness that is added to the model at the same points, complex [N/m or N m/rad]; a loop ignores it.
         """
         wave = self.prepared.coefficients[1] * np.exp(2j * np.pi * self.prepared.phase)
         per_unit = self.whiten(np.array([wave.real, -wave.imag]) * self._per_noise)
@@ -180,7 +180,7 @@ class MeasuredLoop(MeasuredBase):
         return ((self.force(model) - self.prepared.force) / self.prepared.half_range)[None]
 
     def relative(self, model: Model) -> Array:
-        """Magnitude of the relative difference at each row, without the mean: the zero of a load cell is unknown."""
+        """Magnitude of the relative difference at each row, less its mean (the zero of a load cell is unknown)."""
         difference = self.relative_difference(model)[0, self.weights > 0.0]
         return np.abs(difference - np.mean(difference))
 
@@ -215,7 +215,7 @@ class MeasuredLoop(MeasuredBase):
                 yield Outlier(self.name, file, row + before + 1, column, noise_units)
 
     def smooth_changes(self) -> Array:
-        """Change of the whitened residuals by 11 smooth changes of the force, each of half the force range, (11, size).
+        """Changes of the whitened residuals due to 11 smooth force changes of half the force range, (11, size).
 
         These are a constant, and the columns of `basis` for five harmonics; with `fundamental_only` only the first
         harmonic is not 0.
@@ -226,12 +226,12 @@ class MeasuredLoop(MeasuredBase):
         return rows
 
     def gain_and_offset(self) -> Array:
-        """Change of the whitened residuals by a gain error of 100 %, and by an offset of half the range, (2, size)."""
+        """Change of the whitened residuals due to a gain error of 100 % and an offset of half the range, (2, size)."""
         return self.shared_errors.whiten(np.array([self._unit_gain, self._unit_offset]))
 
     @cached_property
     def _usable_rows(self) -> Array:
-        """Mask of the whitened rows that have weight, together with all rows that their noise depends on, (n,)."""
+        """Mask of the whitened rows that have weight and whose noise depends only on rows with weight, (n,)."""
         return self.prepared.row_noise.usable_rows(self.prepared.weight)
 
     @cached_property
@@ -242,14 +242,14 @@ class MeasuredLoop(MeasuredBase):
     def _whiten_rows(self, rows: Array) -> Array:
         """Remove the autocorrelation of the noise from rows of force in units of noise, (..., n); unused rows become 0.
 
-        If only the first harmonic is used, the result has the two components along it, (..., 2).
+        If only the first harmonic is used, the result is the two components along the first harmonic, (..., 2).
         """
         white = self.prepared.row_noise.whiten(rows)
         white *= self._usable_rows
         return white @ self._fundamental if self.fundamental_only else white
 
     def force_changes(self, waves: Array) -> Array:
-        """Changes of the whitened residuals, (c, size), by changes of the force relative to half its range, (c, n)."""
+        """Changes of the whitened residuals, (c, size), due to force changes relative to half the range, (c, n)."""
         return self.whiten(waves * (self._per_noise * self.prepared.half_range))
 
     def whiten(self, difference: Array) -> Array:
@@ -276,7 +276,7 @@ class MeasuredLoop(MeasuredBase):
 
     @cached_property
     def _unit_gain(self) -> Array:
-        """Change of the whitened rows by a gain error of 100 %, (size,).
+        """Change of the whitened rows due to a gain error of 100 %, (size,).
 
         Notes: computed from the force without its noise. With noise, a fit would attribute noise to the gain, and bias
         the model towards small forces (Peelle's puzzle: R. Fruehwirth, D. Neudecker, H. Leeb, EPJ Web of Conferences
@@ -302,7 +302,7 @@ class MeasuredLoop(MeasuredBase):
     def unit_model_error(self) -> SharedErrors:
         """Model error of 100 % of half the force range, as errors that the rows share.
 
-        Its parts are cosine and sine of each harmonic and an offset, and for a loop from rest also a deviation of the
+        The errors are the cosine and sine of each harmonic and an offset; for a loop from rest, also a deviation of the
         first cycle and a drift.
         """
         count, phase = 1 if self.fundamental_only else _ERROR_HARMONICS, self.prepared.phase
@@ -320,11 +320,11 @@ class MeasuredLoop(MeasuredBase):
         """Sensitivity of k parameter estimates to errors of each noise variance that was itself estimated.
 
         Args:
-            influence: change of each estimate by a unit of each whitened residual, (k, size).
+            influence: change of each estimate per unit of each whitened residual, (k, size).
 
         Returns:
             By identifier of the variance, (k, size): the influence times the whitened derivative of the residuals'
-            covariance by the variance, times the standard error of the variance.
+            covariance with respect to the variance, times the standard error of the variance.
         """
         reaction = self.shared_errors.whiten(influence)
         whole = reaction @ self._fundamental.T if self.fundamental_only else reaction
@@ -337,10 +337,10 @@ class MeasuredLoop(MeasuredBase):
         return {(self.name, index): self.shared_errors.whiten(part) for index, part in enumerate(parts)}
 
     def extra_covariance(self, influence: Array) -> Array:
-        """Covariance, (k, k), of k parameter estimates by errors that the weights of the residuals do not include.
+        """Covariance, (k, k), of k parameter estimates due to errors that the weights of the residuals exclude.
 
-        The gain error is added. The model error of the first harmonic, which a smooth error includes, is subtracted.
-        `influence`: change of each estimate by a unit of each whitened residual, (k, size).
+        The gain error is added. The model error of the first harmonic is subtracted, because a smooth error of the
+        model includes it. `influence`: change of each estimate per unit of each whitened residual, (k, size).
         """
         first = self.model_error * _ERROR_SIZES[0] * self.force_changes(basis(self.prepared.phase, 1).T[1:])
         both = influence @ np.vstack((first, self.gain_error * self.gain_and_offset()[0])).T

@@ -33,9 +33,9 @@ _DIGITS = 9
 class MeasuredSweep(MeasuredBase):
     """Measured sweep: dynamic stiffness at n points, with residuals in gain and phase.
 
-    `MeasuredBase` documents the methods of every test. Points are sorted by run (held value, repeat),
-    then by step; a run is a block. The residual ln(K/K_meas) of model K has the gain error in its real and the phase
-    error in its imaginary part.
+    `MeasuredBase` documents the methods of every test. Points are sorted by run (constant value, repeat), then by step;
+    a run is a block. The residual ln(K/K_meas) of model K has the gain error in its real and the phase error in its
+    imaginary part.
 
     Args:
         sweep: measured data.
@@ -120,12 +120,12 @@ class MeasuredSweep(MeasuredBase):
 
     @property
     def independent_count(self) -> float:
-        """Number of independent residuals, which sets the uncertainty of a mean over the sweep."""
+        """Number of independent residuals, which determines the uncertainty of a mean over the sweep."""
         return float(self.residual_count)
 
     @property
     def relative_noise(self) -> float:
-        """Standard deviation of a point relative to |K|, root mean square over gain and phase of all lines."""
+        """Standard deviation of a point relative to |K|: root mean square over gain and phase of all lines."""
         return float(np.sqrt(np.mean(np.square(list(self.noise.random.values())))))
 
     @cached_property
@@ -169,7 +169,7 @@ class MeasuredSweep(MeasuredBase):
 
     @cached_property
     def _distinct(self) -> tuple[Array, Array, Array]:
-        """Distinct operating points of the sweep, whose repeats are computed once.
+        """Distinct operating points of the sweep, so that a model is evaluated once for all repeats.
 
         Returns:
             Frequency [Hz] and reached amplitude [m or rad] of the d distinct points, (2, d); and, for each of the n
@@ -180,7 +180,7 @@ class MeasuredSweep(MeasuredBase):
         return distinct.real, distinct.imag, distinct_index
 
     def _operating_points(self, model: Model) -> tuple[Array, Array, RubberConditions, Array | slice]:
-        """Operating points at which a model has to be evaluated, so that repeats are computed once.
+        """Operating points at which a model has to be evaluated: one for all repeats of a point.
 
         Returns:
             Frequency [Hz], amplitude [m or rad] and conditions of the distinct operating points, or of all points if
@@ -193,7 +193,7 @@ class MeasuredSweep(MeasuredBase):
         return frequency, amplitude, UNKNOWN, distinct_index
 
     def stiffness(self, model: Model, values: Values | None = None) -> Array:
-        """Stiffness of a model at the points of the sweep; repeats are computed once.
+        """Stiffness of a model at the points of the sweep, evaluated once for all repeats of a point.
 
         Args:
             model: model to evaluate.
@@ -210,7 +210,7 @@ class MeasuredSweep(MeasuredBase):
         return stiffness if values is not None else self._keep("stiffness", model, (), stiffness)
 
     def stiffness_slopes(self, model: Model, names: Sequence[str]) -> tuple[Array, Array]:
-        """Stiffness of a model at the points of the sweep, complex (n,), and its derivatives by parameter, (k, n)."""
+        """Stiffness of a model at the points of the sweep, complex (n,), and its parameter derivatives, (k, n)."""
         frequency, amplitude, conditions, distinct_index = self._operating_points(model)
         points = self.direction, frequency, amplitude
         stiffness, slopes = stiffness_and_slopes(model, *points, names, conditions=conditions)
@@ -221,19 +221,19 @@ class MeasuredSweep(MeasuredBase):
         return self.whiten(self.deviation(self.stiffness(model, values)))
 
     def jacobian(self, model: Model, names: Sequence[str]) -> Array:
-        """Derivatives of the whitened residuals by parameter value [SI], (len(names), 2 n); the last are cached."""
+        """Derivatives of whitened residuals with respect to parameters [SI], (len(names), 2 n); the last are cached."""
         if (rows := self._recall("jacobian", model, tuple(names))) is not None:
             return rows
         rows = self.residual_change(self.stiffness_slopes(model, names)[1], model)
         return self._keep("jacobian", model, tuple(names), rows)
 
     def residual_change(self, change: Array, model: Model, added: Array | float = 0.0) -> Array:
-        """Change of the whitened residuals by a small change of the model's stiffness.
+        """Change of the whitened residuals due to a small change of the model's stiffness.
 
         Args:
             change: change of the model's stiffness, complex (..., n) [N/m or N m/rad].
             model: model whose stiffness changes.
-            added: stiffness added to the model's at the points, complex (n,) [N/m or N m/rad].
+            added: stiffness that is added to the model at the points, complex (n,) [N/m or N m/rad].
 
         Returns:
             Changes, (..., 2 n): of n gains, then of n phases.
@@ -247,7 +247,7 @@ class MeasuredSweep(MeasuredBase):
         return self.whiten(gain + 1j * loss * self._phase_per_loss)
 
     def deviation(self, stiffness: Array) -> Array:
-        """Difference of a stiffness from the measured one, before whitening.
+        """Difference between a stiffness and the measured stiffness, before whitening.
 
         Args:
             stiffness: stiffness at the points of the sweep, complex (..., n) [N/m or N m/rad].
@@ -264,12 +264,12 @@ class MeasuredSweep(MeasuredBase):
 
     @cached_property
     def _phase_per_loss(self) -> Array:
-        """Derivative of phase by loss factor eta at each point, 1/(1 + eta^2), (n,)."""
+        """Derivative of the phase with respect to the loss factor eta at each point, 1/(1 + eta^2), (n,)."""
         return (self.measured.real / np.abs(self.measured)) ** 2
 
     @cached_property
     def covariance(self) -> Whitening:
-        """Covariance of the noise of the n log gains and n phases [rad]; the residuals are whitened by it."""
+        """Covariance of the noise of the n log gains and n phases [rad], by which the residuals are whitened."""
         random = self.noise.scatter(self.name, self.held_value, self.step)
         if self.sweep.relative_error is not None and self.sweep.noise is None:
             random = np.maximum(np.tile(self.sweep.relative_error[self.order], (2, 1)), FLOOR)
@@ -284,10 +284,11 @@ class MeasuredSweep(MeasuredBase):
         return SharedErrors.of_groups(points, self.covariance.per_scatter, (1.0, 1.0))
 
     def whiten(self, difference: Array) -> Array:
-        """Whiten deviations by the scatter and the errors that points share.
+        """Divide deviations by their noise and remove the correlation that errors shared by points cause.
 
-        With a model error, the errors shared by runs and lines are no part of the weights: the model's error also
-        differs from level to level, and a level must not lose weight because of a smaller error of the rig.
+        With a model error, the errors shared by runs and lines are not part of this noise: the error of the model
+        differs from line to line as well and is larger, so the smaller error of the rig must not reduce the weight of a
+        line.
 
         Args:
             difference: relative differences in magnitude + i differences in phase [rad], complex (..., n).
@@ -304,10 +305,11 @@ class MeasuredSweep(MeasuredBase):
         return self.covariance.noise_sensitivity(influence)
 
     def extra_covariance(self, influence: Array) -> Array:
-        """Covariance, (k, k), of k estimates by errors that the weights do not include beside a model error.
+        """Covariance, (k, k), of k parameter estimates due to errors that the weights of the residuals exclude.
 
-        The errors shared by runs and lines are added. The independent model error, which a smooth error includes, is
-        subtracted. `influence`: change of each estimate by a unit of each whitened residual, (k, 2 n).
+        With a model error, the errors shared by runs and lines are added, and the independent model error is subtracted
+        because a smooth error includes it. `influence`: change of each estimate per unit of each whitened residual,
+        (k, 2 n).
         """
         noise, whitened = self.covariance, self.model_errors.whiten(influence)
         lines = SharedErrors.of_groups(noise.line, noise.per_scatter, self.noise.level)
@@ -315,7 +317,7 @@ class MeasuredSweep(MeasuredBase):
         return np.asarray(added - self.model_errors.covariance(whitened))
 
     def with_independent_noise(self) -> Self:
-        """Return the sweep without model error and errors that runs and lines share: with its scatter alone."""
+        """Return the sweep with its scatter alone, without model error and errors that runs and lines share."""
         return replace(self, noise=replace(self.noise, shared=(0.0, 0.0), level=(0.0, 0.0)), model_error=0.0)
 
     def relative_difference(self, model: Model) -> Array:
@@ -340,7 +342,7 @@ class MeasuredSweep(MeasuredBase):
         return self.scaled_distance(self.deviation(self.stiffness(model))) / np.sqrt(2.0)
 
     def displayed_residual(self, model: Model) -> Array:
-        """Residuals for charts in units of noise, (2 n,): whitened; in units of scatter at points without weight."""
+        """Residuals for charts in units of noise, (2 n,), whitened; points without weight are in units of scatter."""
         deviation = self.deviation(self.stiffness(model))
         distances = self.covariance.scaled(deviation).ravel()
         return np.where(np.tile(self.weights > 0.0, 2), self.whiten(deviation), distances)
@@ -359,7 +361,7 @@ class MeasuredSweep(MeasuredBase):
             yield Outlier(self.name, file, row, "stiffness", noise_units)
 
     def shared_error_columns(self, chosen: Array) -> list[Array]:
-        """Change of the whitened residuals by a gain error of 100 %, (2 n,), and by a phase error of 1 rad, (2 n,).
+        """Change of the whitened residuals due to a gain error of 100 % and to a phase error of 1 rad, (2 n,) each.
 
         Args:
             chosen: mask of the points that have the error, (n,).

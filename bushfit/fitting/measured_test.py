@@ -27,8 +27,8 @@ class MeasuredBase(ABC):
     Args:
         kind: "loop" or "sweep".
         components: names of the residuals of a point: "force", or "storage" and "loss".
-        test_conditions: temperature of the rubber, and its strains before: one number each for a loop, one for each row
-            of a sweep's file.
+        test_conditions: temperature and earlier strains of the rubber: one number each for a loop, one for each row of
+            a sweep's file.
         model_error: standard deviation of the model's error, added to the noise, relative to |K| in phase and in
             quadrature, or relative to half the force range of a loop. 0: noise alone.
         contradiction: sentence on a disagreement with an earlier test of the same points; None without one.
@@ -48,7 +48,7 @@ class MeasuredBase(ABC):
     @property
     @abstractmethod
     def weights(self) -> Array:
-        """Weight of each point, (n,): 1 full, 0 left out; for a long loop the number of rows averaged in the point."""
+        """Weight of each point, (n,): 1 full, 0 left out; for a long loop, the number of rows averaged in the point."""
 
     @abstractmethod
     def relative_difference(self, model: Model) -> Array:
@@ -73,7 +73,7 @@ class MeasuredBase(ABC):
 
     @abstractmethod
     def jacobian(self, model: Model, names: Sequence[str]) -> Array:
-        """Derivatives of the whitened residuals by parameter value [SI], (len(names), size); the last are cached."""
+        """Derivatives of whitened residuals with respect to parameters [SI], (len(names), size); cached once."""
 
     @property
     @abstractmethod
@@ -96,7 +96,7 @@ class MeasuredBase(ABC):
         return self.unit_model_error.scaled(self.model_error)
 
     def error_products(self, model: Model, names: Sequence[str]) -> tuple[Array, Array, Array]:
-        """Compute what determines the size of a model error.
+        """Inner products that determine the likelihood of the size of a model error.
 
         Args:
             model: model near the minimum.
@@ -151,8 +151,7 @@ class MeasuredBase(ABC):
     def relative(self, model: Model) -> Array:
         """Magnitude of the relative difference of model and test at each point with weight, (n,), for the NRMSE.
 
-        The difference is that of the complex stiffness relative to |K|, or of a loop's force relative to half its
-        range.
+        The difference of the complex stiffness is relative to |K|, that of a loop's force to half the force range.
         """
         return np.linalg.norm(self.relative_difference(model)[:, self.weights > 0.0], axis=0)
 

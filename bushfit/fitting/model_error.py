@@ -1,17 +1,17 @@
-"""The closest fit of a model that misses its tests, and the misfit that its intervals and bands include.
+"""Closest fit of a model that misses its tests, and the remaining error that intervals and bands include.
 
-Parameters of a model that no rubber follows exactly are those closest to the tests. So where the tests show a lack of
-fit, the estimate is least squares with the noise plus a model error that is independent from operating point to
-operating point and relatively of one size. The discrepancy is smooth in truth: a Gaussian process describes it in the
-covariance of the estimate and in the bands of predictions, and never in the weights, where it could imitate what the
-parameters do.
+No rubber follows the model exactly, so the best parameters are those whose model is closest to the tests. If the tests
+show a lack of fit, the estimate is therefore a least-squares fit with the noise plus a model error that is independent
+from operating point to operating point and has one relative size. In fact the discrepancy is smooth. A Gaussian process
+describes it in the covariance of the estimate and in the bands of predictions, but not in the weights of the fit, where
+it could imitate the parameters.
 
 Notes:
     The estimate is that of L2 calibration (R. Tuo, C. F. J. Wu, Ann. Statist. 43 (2015) 2331-2352) on the operating
-    points of the tests; a process in the weights needs a prior against what parameters do (M. Plumlee, J. Am. Stat.
-    Assoc. 112 (2017) 1274-1285; M. Gu, L. Wang, SIAM/ASA J. Uncertain. Quantif. 6 (2018) 1555-1583). Its covariance
-    is the sandwich J^+ V J^+^T (H. White, Econometrica 50 (1982) 1-25), V the covariance of noise and process. Sizes
-    and lengths are those of the largest restricted likelihood (H. D. Patterson, R. Thompson, Biometrika 58 (1971)
+    points of the tests; a process in the weights would have to be orthogonal to the parameters (M. Plumlee, J. Am.
+    Stat. Assoc. 112 (2017) 1274-1285; M. Gu, L. Wang, SIAM/ASA J. Uncertain. Quantif. 6 (2018) 1555-1583). Its
+    covariance is the sandwich J^+ V J^+^T (H. White, Econometrica 50 (1982) 1-25), V the covariance of noise and
+    process. Sizes and lengths maximise the restricted likelihood (H. D. Patterson, R. Thompson, Biometrika 58 (1971)
     545-554).
 """
 
@@ -71,9 +71,10 @@ _MAXIMUM_ROUNDS, _SETTLED = 12, 0.02
 def with_excess_errors(
     plain_fit: FitResult, bounds: Bounds, rig: RigSettings, refit: Callable[[LevelErrors], FitResult]
 ) -> tuple[FitResult, Unnamed | None, list[str]]:
-    """Add to a fit the errors that its tests show beyond the noise: of the model, or of levels.
+    """Extend a fit by the errors that its tests show beyond the noise: errors of the model, or of levels.
 
-    If levels disagree by more than chance explains, the rig or the model is the cause, and the fit includes both.
+    Levels that disagree by more than chance explains may do so because of the rig or of the model; the fit then
+    includes errors of both.
 
     Args:
         plain_fit: least-squares fit with the noise alone.
@@ -82,7 +83,8 @@ def with_excess_errors(
         refit: function that repeats the fit with errors of levels in the noise.
 
     Returns:
-        The fit; the error of the model as a correction of the stiffness, or None; and a warning if the model misses.
+        The fit; the error of the model as a correction of the stiffness, or None; and a warning if the model misses its
+        tests.
     """
     found, error = with_model_error(plain_fit, bounds, rig)
     if error or not found.names:
@@ -104,7 +106,7 @@ def with_excess_errors(
 def with_model_error(
     plain_fit: FitResult, bounds: Bounds, rig: RigSettings = UNSTATED, *, smooth: bool = False, certain: bool = False
 ) -> tuple[FitResult, Unnamed | None]:
-    """Refit a model that misses its tests, with an error of the model added to the noise; one that fits is unchanged.
+    """Refit a model that misses its tests, with an error of the model added to the noise; otherwise keep the fit.
 
     Args:
         plain_fit: least-squares fit with the noise alone.
@@ -144,7 +146,7 @@ def with_model_error(
 
 
 def closest_fit(plain_fit: FitResult, bounds: Bounds) -> tuple[FitResult, float]:
-    """Fit by least squares with the noise and an independent model error, whose size is estimated as well.
+    """Fit by least squares with the noise and an independent model error of a size that is estimated as well.
 
     Size (by restricted likelihood) and parameters are estimated in turn until the size converges.
 
@@ -179,7 +181,7 @@ def closest_fit(plain_fit: FitResult, bounds: Bounds) -> tuple[FitResult, float]
 
 
 def likeliest_model_error(model: Model, data_sets: Sequence[MeasuredTest], names: Sequence[str]) -> float:
-    """Size of the independent model error, relative to the stiffness, that maximises the restricted likelihood.
+    """Size of the independent model error, relative to the stiffness, by maximum restricted likelihood.
 
     Args:
         model: model near the minimum, at which the residuals are linearised.
@@ -265,7 +267,7 @@ def log_likelihood(solution: FitResult, prior_precision: Mapping[str, float]) ->
 
 
 def _exceeds_noise(solution: FitResult, rig: RigSettings) -> bool:
-    """True if chi-square of all tests, or of one, exceeds that of noise and errors of the rig's accuracy class."""
+    """True if chi-square, of all tests or of one, is too large for noise and errors of the rig's accuracy class."""
     squares, counts = [], [test.residual_count for test in solution.problem.tests]
     for test, rows in zip(solution.problem.tests, residual_slices(solution.problem.tests), strict=True):
         whitened = SharedErrors.from_columns(_errors_of_class(test, rig)).whiten(solution.residual[rows])
@@ -291,11 +293,10 @@ def _is_smooth(tests: FittedTests) -> bool:
 
 
 def _errors_of_class(test: MeasuredTest, rig: RigSettings) -> Array:
-    """Changes of a test's n whitened residuals by one standard deviation of each of w errors of the rig, (w, n).
+    """Changes of a test's n whitened residuals due to one standard deviation of each of w rig errors, (w, n).
 
-    The errors are those that the estimated noise does not contain; their size is the accuracy class of the rig.
-
-    These are the gain error of a loop, or the gain and phase errors of each level of a sweep.
+    The errors are the gain error of a loop, or the gain and phase errors of each level of a sweep. The estimated noise
+    does not contain them; their size is the accuracy class of the rig.
     """
     if isinstance(test, MeasuredLoop):
         gain = test.gain_error * test.gain_and_offset()[:1]
@@ -310,8 +311,8 @@ def _thinned(tests: Sequence[MeasuredTest], error: float = 0.0) -> list[Measured
 
     Args:
         tests: tests without a model error.
-        error: independent model error of the loops. Only the shape of a loop has it, from the second harmonic up: the
-            first harmonic changes with the stiffness.
+        error: independent model error of the loops, which applies to the harmonics from the second up; the first
+            harmonic changes with the stiffness.
     """
     thinned = list[MeasuredTest]()
     for test in tests:

@@ -1,8 +1,8 @@
 """Measurement noise of sweeps: scatter from point to point, and errors shared by a whole run.
 
-A run is one recording, in which frequency or amplitude is stepped and the other is held constant. Its points share a
-gain error and a phase error. A line, or level, is the set of runs with the same held value: its repeats. All errors are
-those of ln K = ln|K| + i phase, so gain errors are real and phase errors imaginary, both relative to |K|.
+A run is one recording, in which frequency or amplitude is stepped and the other is constant. Its points share a gain
+error and a phase error. A line, or level, is the set of all runs (repeats) with the same constant value. All errors are
+errors of ln K = ln|K| + i phase, so gain errors are real and phase errors imaginary, both relative to |K|.
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -53,13 +53,13 @@ class SweepNoise:
     """Noise of all sweeps of a campaign.
 
     Args:
-        random: standard deviation from point to point of (ln|K|, phase [rad]), by line (runs at one held value).
+        random: standard deviation from point to point of (ln|K|, phase [rad]), by line (runs at one constant value).
         shared: standard deviation of the errors shared by a run, (ln|K|, phase [rad]).
         origin: source of the noise: "repeats", "stated" or "assumed".
         freedom: degrees of freedom behind `shared`; 0 if it is not estimated from repeats.
         scatter_freedom: degrees of freedom behind `random`; 0 if it is stated.
-        slopes: for each sweep, by name, whose scatter grows along the stepped quantity: exponent, and the step at which
-            the scatter is that of `random`.
+        slopes: by name of each sweep whose scatter grows along the stepped quantity: exponent of the growth, and the
+            step at which the scatter equals `random`.
         level: standard deviation of the errors shared by all runs of a line, (ln|K|, phase [rad]).
         level_freedom: degrees of freedom behind `level`; 0 if it is exact.
         excess_warnings: warning on each sweep whose runs differ by more than the accuracy class of its rig explains, by
@@ -100,10 +100,10 @@ class SweepNoise:
 def sweep_noise(sweeps: Sequence[Sweep], rig: RigSettings = UNSTATED) -> SweepNoise:
     """Estimate the noise of the sweeps of one rig from their repeats.
 
-    Without repeats the scatter is estimated about a smooth curve over the logarithm of the stepped quantity, and the
-    shared error is that of the rig's class, stated or assumed. With repeats, a stated class is an error that all runs
-    at one held value (amplitude or frequency) share, which repeats cannot reveal. A noise stated in the campaign, or
-    for each point in the file, replaces the scatter.
+    Without repeats, the scatter is estimated about a smooth curve over the logarithm of the stepped quantity, and the
+    shared error is taken from the rig's class, stated or assumed. With repeats, a stated class is the size of an error
+    that all runs at one constant amplitude or frequency share, which repeats cannot reveal. A noise stated in the
+    campaign, or for each point in the file, replaces the scatter.
 
     Returns:
         Standard deviations of gain and phase (of ln K) of all sweeps: scatter of the points, and shared errors.
@@ -171,9 +171,9 @@ def _scatter_growth(lines: Sequence[LineNoise]) -> tuple[float, float] | None:
     """Exponent of the growth of the scatter along the stepped quantity, and a reference step; None without growth.
 
     Notes:
-        Squares of the deviations over their line's mean are regressed on ln(step) and tested by Koenker (1981), whose
-        scale is the scatter of the squares, so that heavy tails do not produce a slope. The exponent has the largest
-        likelihood.
+        Squares of the deviations, divided by the mean of their line, are regressed on ln(step). Koenker's test (1981)
+        decides, because its scale is the scatter of the squares, so that heavy tails do not produce a slope. The
+        exponent maximises the likelihood.
     """
     squares, logs = [], []
     for line in lines:
@@ -207,7 +207,7 @@ def _pooled(lines: Mapping[LineKey, LineNoise], measured: Sequence[LineNoise]) -
     With few degrees of freedom gain and phase share one variance, unless they differ significantly.
 
     Args:
-        lines: noise of all lines (runs at one held value), by name of the sweep and held value.
+        lines: noise of all lines (runs at one constant value), by name of the sweep and constant value.
         measured: noise of the lines with repeats or enough points.
 
     Returns:
@@ -236,7 +236,7 @@ def _pooled(lines: Mapping[LineKey, LineNoise], measured: Sequence[LineNoise]) -
 
 
 def _shared(lines: Sequence[LineNoise], rig: RigSettings) -> Array:
-    """Standard deviation of the relative gain and phase [rad] errors that a run's points share, (2,), from repeats.
+    """Standard deviations of relative gain and phase [rad] errors shared by the points of a run, (2,), from repeats.
 
     Outlying pairs are left out. Few repeats often agree by chance: below `_ENOUGH` degrees of freedom the variance is
     averaged with that of the rig's accuracy class.
@@ -260,7 +260,7 @@ def _pair(values: Array) -> tuple[float, float]:
 
 
 def _unequal(lines: Sequence[LineNoise]) -> bool:
-    """True if runs of sweeps scatter unequally, by Bartlett's test (1937) of the mean variance of gain and phase."""
+    """True if lines of sweeps scatter unequally, by Bartlett's test (1937) of the mean variance of gain and phase."""
     variance = np.array([line.variance.mean() for line in lines])
     freedom = np.array([2.0 * line.freedom for line in lines])
     if variance.size < 2 or not variance.all():

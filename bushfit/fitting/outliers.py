@@ -1,7 +1,8 @@
 """Outliers: rows that are far from a smooth curve or a model, and from their neighbours as well.
 
-Physics missing from a model makes whole stretches of a test miss by similar amounts; only a fault of the record makes
-one row differ from the rows next to it. A misfit, however large, is therefore not an outlier.
+An effect that a model lacks makes whole stretches of a test differ from the model by similar amounts; only a fault of
+the record makes one row differ from the rows next to it. A row far from the model but near its neighbours is therefore
+not an outlier.
 """
 
 from collections.abc import Callable
@@ -57,7 +58,7 @@ def are_outliers(residual: Array, recorded: Array, limit: float) -> Array:
     Args:
         residual: distance of each row from the curve, (n,).
         recorded: recorded displacement or force of each row, (n,).
-        limit: distance from which on a row is far, in the unit of the residual.
+        limit: distance beyond which a row is far, in the unit of the residual.
 
     Returns:
         Mask of the outliers, (n,).
@@ -131,8 +132,8 @@ def outlying_points(
     """Find points of a sweep that are farther from the model and from their neighbours than noise explains.
 
     A repeated point must also differ from its repeats. If two or more repeats agree and the point differs from them,
-    its neighbours are not compared, so that neither adjacent outliers nor a misfit of the model hide it; the farthest
-    such point of an operating point is an outlier even if it is near the model.
+    its neighbours are not compared, so that neither adjacent outliers nor a misfit of the model can hide the outlier.
+    Of several such points at one operating point, the farthest is an outlier even if it is near the model.
 
     Args:
         deviation: deviation of each point from the model, gain + i phase, complex (n,).
@@ -189,7 +190,7 @@ def contradictions(stiffness: Array, point_index: Array) -> list[tuple[float, in
 
 
 def misfit_scale(distance: Array, parts: int) -> float:
-    """Median distance of points from the model, relative to the median by noise alone; at least 1.
+    """Median distance of points from the model, relative to the median that noise alone causes; at least 1.
 
     Args:
         distance: distance of each point in units of noise, (n,).
@@ -219,7 +220,7 @@ def _from_neighbours(values: Array, starts: Array, window: int) -> Array:
 
 
 def _from_repeats(values: Array, point_index: Array) -> tuple[Array, Array]:
-    """Number of other repeats of each point, (n,), and its difference from their median, complex (n,); 0 without any.
+    """Number of other repeats of each point, (n,), and its difference from their median (0 without any), complex (n,).
 
     Args:
         values: deviations, complex (n,).
@@ -240,7 +241,7 @@ def _from_repeats(values: Array, point_index: Array) -> tuple[Array, Array]:
 
 
 def least_absolute(basis: Array, values: Array, smallest: float) -> Array:
-    """Fit a curve with the least sum of absolute distances, which hardly follows outliers: coefficients (k, m).
+    """Fit a curve with the least sum of absolute distances, robust against outliers; return coefficients, (k, m).
 
     Args:
         basis: values of k functions at the points, (n, k).

@@ -1,8 +1,8 @@
-"""Preload as a variable of the model: whether the tests of a direction show that it has an influence.
+"""Preload as a variable of the model, which is added if the tests of a direction show an influence of the preload.
 
 A direction with tests at three preloads or more determines the six parameters of the effect `preload`; two preloads
-determine three of them. An F-test decides between the model with and without them: noise, errors of levels and gain
-errors of loops alone may not explain the difference.
+determine three of them. An F-test decides between the models with and without these parameters. They are added if
+noise, errors of levels and gain errors of loops do not explain the difference.
 """
 
 from __future__ import annotations
@@ -86,7 +86,7 @@ def with_preload(data: PreparedCampaign) -> PreparedCampaign:
 
 
 def other_line(found: FitResult) -> tuple[Alternative, ...]:
-    """Fit whose friction and springpot follow the other line: over the preload instead of its square, or the reverse.
+    """Alternative fit in which friction and springpot are linear in the preload instead of its square, or the reverse.
 
     Args:
         found: fit with the effect of preload.
@@ -112,9 +112,9 @@ def other_line(found: FitResult) -> tuple[Alternative, ...]:
 
 
 def _is_symmetric(tested: PreloadRange, place: Place) -> bool:
-    """True if the influence of two preloads can be equal for both senses, as in a tube or in rubber in shear.
+    """True if a preload can have the same influence in both senses, as in a tube or in rubber in shear.
 
-    It is not for two preloads that differ in sense alone, or for bars in tension.
+    False for bars in tension, and for two preloads of equal size and opposite sense.
     """
     return place.motion is not STRAINING and not math.isclose(-tested.low, tested.high, rel_tol=SAME_PRELOAD)
 

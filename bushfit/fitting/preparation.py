@@ -1,4 +1,4 @@
-"""Tests of a campaign prepared for a fit, one per measured loop and one per sweep; and simulated tests not made yet."""
+"""Tests prepared for a fit, one per measured loop and one per sweep; and simulated tests for planning."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
@@ -43,7 +43,7 @@ def prepare_loops(
     Args:
         loops: measured loops.
         rig: accuracy class of the rig (gain and phase errors).
-        without_outliers: True to give rows whose force is an outlier no weight.
+        without_outliers: True to give weight 0 to rows whose force is an outlier.
     """
     prepared_loops = [prepare_loop(loop, without_outliers=without_outliers) for loop in loops]
     found = [MeasuredLoop(prepared).weighted(np.array(prepared.loop.weight)) for prepared in prepared_loops]
@@ -66,7 +66,7 @@ def with_gain_errors(loops: Sequence[MeasuredLoop], rig: RigSettings) -> list[Me
 
 
 def with_gain_weighting(data_sets: Iterable[MeasuredTest], *, weigh: bool) -> list[MeasuredTest]:
-    """Return the tests; the noise that weights residuals of loops includes the rig's gain error if `weigh` is True."""
+    """Return the tests; if `weigh` is True, the noise by which loop residuals are weighted includes the gain error."""
     return [replace(test, gain_weighs=weigh) if isinstance(test, MeasuredLoop) else test for test in data_sets]
 
 
@@ -90,7 +90,7 @@ def prepare_sweeps(
 ) -> list[MeasuredSweep]:
     """Prepare sweeps for a fit, each with its noise.
 
-    The noise is estimated once for all sweeps of bushings, and once for those of each specimen.
+    The noise is estimated once for all sweeps of bushings, and once for all sweeps of each specimen.
 
     Args:
         sweeps: measured sweeps.
@@ -136,7 +136,7 @@ def _with_contradictions(tests: Sequence[_Kind], conditions: Sequence[Array]) ->
 
 
 def with_level_errors(tests: Sequence[MeasuredTest], error: tuple[float, float], freedom: int) -> list[MeasuredTest]:
-    """Return tests with other gain and phase errors that all runs of a level of a sweep share; loops have none.
+    """Return tests with new sizes of the gain and phase errors that all runs of a level of a sweep share.
 
     Args:
         tests: loops, which are unchanged, and sweeps.
@@ -156,7 +156,7 @@ def split_by_kind(data_sets: Iterable[MeasuredTest]) -> tuple[list[MeasuredLoop]
 
 
 def residual_slices(data_sets: Iterable[MeasuredTest]) -> list[slice]:
-    """Slices of the residuals of each test in the array of the residuals of all tests in order."""
+    """Slice of each test's residuals in the array of the residuals of all tests, in order."""
     ends = accumulate((test.size for test in data_sets), initial=0)
     return [slice(*pair) for pair in pairwise(ends)]
 
@@ -169,7 +169,7 @@ def operating_conditions(bushing: Bushing | None, data_sets: Iterable[MeasuredTe
 
 
 def log_slopes(model: Model, data_set: MeasuredTest, names: Sequence[str]) -> Array:
-    """Derivatives of ln K of a model at the operating points of a test by parameter value, complex (len(names), n).
+    """Derivatives of a model's ln K at a test's operating points with respect to parameters [SI], (len(names), n).
 
     Args:
         model: model at whose values the derivatives are taken.
@@ -205,7 +205,7 @@ def planned_loop(
         rows: number of rows.
 
     Returns:
-        Settled loop whose force has no noise, but whose residuals are in units of `noise`.
+        Settled loop without noise in its force; its residuals are in units of `noise`.
     """
     phase, nil = cycles * np.arange(rows) / rows, np.zeros(rows)
     motion = amplitude * np.sin(2.0 * np.pi * phase)

@@ -1,4 +1,4 @@
-"""A campaign made ready to fit."""
+"""Campaign prepared for fits: tests with their noise, and bounds, priors and ties of parameters."""
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -43,14 +43,14 @@ _Kind = TypeVar("_Kind", MeasuredLoop, MeasuredSweep, MeasuredLoop | MeasuredSwe
 
 @dataclass(frozen=True, eq=False)
 class PreparedCampaign:
-    """A campaign ready to fit: its tests with their noise, and bounds, priors and ties of its parameters.
+    """Campaign prepared for fits: its tests with their noise, and bounds, priors and ties of its parameters.
 
     Args:
         campaign: campaign as read from its file.
         loops: measured loops with their noise.
         sweeps: measured sweeps with their noise.
         bounds: limits of parameters from [fit] [SI], by name.
-        preload_notes: sentences on the influence of the preload that the tests show.
+        preload_notes: sentences that state whether the tests show an influence of the preload.
         constraints: priors and ties of parameters, for every model that is fitted.
     """
 
@@ -119,11 +119,11 @@ class PreparedCampaign:
     def require_tests(
         self, tests: Sequence[_Kind], message: str, hint: str, found: str = "no [[loops]] and no [[sweeps]]"
     ) -> Sequence[_Kind]:
-        """Return the tests of a fit, after a check that there are any and that none strains rubber beyond its limits.
+        """Check that there are tests to fit and that none strains rubber beyond its limits, and return the tests.
 
         Args:
             tests: loops or sweeps.
-            message: error message if there are none.
+            message: error message if there are no tests.
             hint: next step for the user.
             found: text on the tests that the campaign has instead.
 
@@ -137,7 +137,7 @@ class PreparedCampaign:
         return tests
 
     def without(self, outliers: Sequence[Outlier]) -> "PreparedCampaign":
-        """Return the campaign with weight 0 on given outliers of sweeps; those of loops have weight 0 already."""
+        """Return the campaign with weight 0 on given outliers of sweeps; outliers of loops have weight 0 already."""
         sweeps = []
         for data_set in self.sweeps:
             rows = [outlier.row - 1 for outlier in outliers if outlier.test == data_set.name]
@@ -145,7 +145,7 @@ class PreparedCampaign:
         return replace(self, sweeps=tuple(sweeps))
 
     def with_sweeps(self, sweeps: Sequence[Sweep]) -> "PreparedCampaign":
-        """Return the campaign with other sweeps of the same rows, such as corrected ones, and their noise estimated."""
+        """Return the campaign with new, such as corrected, sweeps of the same rows, and their noise estimated."""
         fit, new = self.campaign.fit, list[MeasuredTest]()
         for old, data_set in zip(self.sweeps, prepare_sweeps(sweeps, fit.residuals, self.campaign.rig), strict=True):
             rows = old.order[old.weights == 0.0]
@@ -155,12 +155,12 @@ class PreparedCampaign:
 
     @property
     def given_values(self) -> dict[str, float]:
-        """Parameter values given in [fit] of the campaign [SI], as start values or fixed values, by name."""
+        """Start values and fixed values of parameters given in [fit] of the campaign [SI], by name."""
         settings = self.campaign.fit.parameters
         return {name: setting.value for name, setting in settings.items() if setting.value is not None}
 
     def start_values(self, data_sets: Sequence[MeasuredTest]) -> dict[str, float]:
-        """Start values of the paper's parameters [SI] by name: those of [fit], else estimates from the tests."""
+        """Start values of the paper's parameters [SI] by name: given in [fit], or else estimated from the tests."""
         with error_location(self.campaign.path):
             return start_values(self.campaign.bushing, data_sets, self.given_values)
 
@@ -169,7 +169,8 @@ class PreparedCampaign:
     ) -> Model:
         """Build the model that a fit starts from.
 
-        Its values are those given in the campaign, or estimated from the tests if these give a lower chi-square.
+        The start values are given in the campaign, or estimated from the tests if the estimates have a lower
+        chi-square.
 
         Args:
             effects: names of the model's effects.
@@ -206,7 +207,7 @@ class PreparedCampaign:
     def problem(
         self, effects: Sequence[str], data_sets: Sequence[MeasuredTest], stage_fixed: Mapping[str, float]
     ) -> FitProblem:
-        """Build the least-squares problem of the free parameters of a model, from the start of `starting_model`.
+        """Build the least-squares problem of the free parameters of a model, which starts from `starting_model`.
 
         Args:
             effects: names of the model's effects.
@@ -262,7 +263,7 @@ class PreparedCampaign:
         return chosen
 
     def static_loops(self) -> list[MeasuredLoop]:
-        """Loops that `fit-static` uses: the axial ones, else all loops of the bushing, else all loops."""
+        """Loops that `fit-static` uses: axial loops; without these, all loops of the bushing; else all loops."""
         hint = "add a quasi-static loop, or run bushfit fit for the sweeps alone"
         return _preferred(self.require_tests(self.loops, "fit-static needs a loop", hint, "no [[loops]]"))
 
@@ -271,7 +272,7 @@ class PreparedCampaign:
         """Sweep that `fit-dynamic` uses, reduced to the amplitudes of the campaign, else to the smallest amplitude.
 
         Frequency sweeps are preferred to others, then axial sweeps, then sweeps of the bushing. An amplitude sweep is
-        reduced to the smallest amplitude at each frequency; a sweep in which neither is held keeps all points.
+        reduced to the smallest amplitude at each frequency. A sweep in which both vary keeps all points.
 
         Raises:
             FitError: the campaign has no sweep, or none at the amplitudes that it names.
@@ -303,7 +304,7 @@ class PreparedCampaign:
 
 
 def _preferred(data_sets: Sequence[_Kind]) -> list[_Kind]:
-    """Select the axial tests, else those of the bushing, else all; of these, only those at the smallest preload."""
+    """Select the axial tests, else all tests of the bushing, else all tests; only those at the smallest preload."""
     axial = [test for test in data_sets if test.direction.axis is Direction.AXIAL]
     tests = axial or [test for test in data_sets if test.direction.axis] or list(data_sets)
     loads = [abs(test.test.preload.value) if test.test.preload else 0.0 for test in tests]

@@ -1,8 +1,8 @@
 """Loop prepared as an input of the model: the measured displacement without its noise, and the force with weights.
 
-A loop's displacement is periodic. It is written as the harmonics that rise above its noise, found by least
-squares at the samples as they are (any number of cycles, sine or triangle, evenly sampled or not), so the
-turning points that friction needs are those of the motion and not of the sensor.
+A loop's displacement is periodic. It is represented by the harmonics that exceed its noise, fitted by least squares to
+the samples (any number of cycles, sine or triangle, evenly sampled or not). The turning points, on which friction
+depends, are then free of the sensor's noise.
 """
 
 from collections.abc import Mapping, Sequence
@@ -60,7 +60,7 @@ class PreparedLoop:
         from_rest: True if the record begins at rest, False if the loop is settled.
         phase: position of each row [cycles from the first row], (n,).
         force: measured force per row, or per bin of phase if the loop is long [N or N m], (n,).
-        weight: number of rows behind each entry of `force`, 0 at the turning points, (n,).
+        weight: number of rows averaged in each entry of `force`, 0 at the turning points, (n,).
         noise: standard deviation of one row's force [N or N m].
         coefficients: complex harmonics of the displacement, mean first [m or rad].
         half_range: half of the range of the measured force without outliers [N or N m].
@@ -68,7 +68,7 @@ class PreparedLoop:
             memory of the rubber cannot be distinguished: the motion is not about zero or starts from rest at another
             position, the force has a preload, or other cycles precede the loop. None: the fit uses the force itself.
         notes: sentences on parts of the record that were left out, and on times that do not agree with the rows.
-        outliers: by column, indices of faulty rows, and their distance from the others [noise].
+        outliers: by column, indices of faulty rows and their distances from the harmonics in units of noise.
         first_row: index of the loop's first row in the whole record.
         row_noise: correlation of the noise of a row with that of the rows before.
     """
@@ -127,7 +127,7 @@ class PreparedLoop:
 
     @property
     def has_predecessor(self) -> bool:
-        """True if the record has rows before the loop, whose deformation the rubber remembers."""
+        """True if the record has earlier rows before the loop; the rubber remembers their deformation."""
         return self.loop.part is not None and self.loop.part.first_row > 0
 
     @cached_property
@@ -170,7 +170,7 @@ class PreparedLoop:
 
 
 def prepare_loop(loop: Loop, *, without_outliers: bool = False) -> PreparedLoop:
-    """Prepare a loop for the model: find its cycles, remove the noise of its displacement, and weight its force.
+    """Prepare a loop for a fit: find its cycles, remove the noise of its displacement, and weight its force.
 
     Outliers of displacement or force do not affect cycles, motion and noise. With `without_outliers`, rows whose force
     is an outlier get no weight.
@@ -231,7 +231,7 @@ def prepare_loop(loop: Loop, *, without_outliers: bool = False) -> PreparedLoop:
 
 
 def _check_loses_energy(prepared: PreparedLoop) -> None:
-    """Raise a FitError if the force lags behind the displacement by more than noise and the rig's delay explain."""
+    """Raise a FitError if a loop gains energy, by more than noise and a delay of the rig explain."""
     stiffness = prepared.first_harmonic
     rows = prepared.weight.sum() / prepared.row_noise.rows_as_one
     chance = prepared.noise * np.sqrt(2.0 / rows) / abs(prepared.coefficients[1])
@@ -312,8 +312,9 @@ def _starts_at_rest(
 ) -> tuple[bool, bool]:
     """Test whether a record begins at rest at zero, or at rest about a preload.
 
-    A record that begins at rest differs at its start from the force one cycle later by more than noise explains. A
-    settled loop does not, even if it passes through the origin, as with a zero error of its load cell.
+    If a record begins at rest, the force at its start differs from the force one cycle later by more than noise
+    explains. In a settled loop both are equal, even if it passes through the origin because of a zero error of its load
+    cell.
 
     Args:
         loop: steady cycles of the record.
@@ -348,7 +349,7 @@ def recorded_means(prepared: PreparedLoop) -> list[Preload]:
     """Mean displacement and mean force of a loop that are too large for a zero error of a sensor.
 
     Returns:
-        Means [m, rad or 1, and N or N m]; none, one or both.
+        Means [m, rad or 1, and N or N m] that are too large; none, one or both.
     """
     if prepared.datum is None:
         return []

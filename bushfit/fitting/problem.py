@@ -33,7 +33,7 @@ class FitProblem:
         tests: tests with their noise.
         names: names of the k free parameters.
         bounds: limits of parameters [SI] by name, inside their default limits.
-        shared_error: error that the residuals of all tests share in addition to the noise of each test; None without.
+        shared_error: error that the residuals of all tests share in addition to the noise of each test; or None.
     """
 
     model: Model
@@ -77,7 +77,7 @@ class FitProblem:
         return self.shared_error.whiten(rows) if self.shared_error else rows
 
     def jacobian(self, model: Model, *, with_priors: bool = True) -> Array:
-        """Derivatives of the whitened residuals by the coordinates of the k free parameters.
+        """Derivatives of the whitened residuals with respect to the coordinates of the k free parameters.
 
         Args:
             model: model at whose values the derivatives are taken.
@@ -113,7 +113,7 @@ class FitProblem:
         return np.clip(self.coordinates.point(values), *self.limits)
 
     def at_bound(self, point: Array) -> dict[str, End]:
-        """Parameters that are at a bound, by name, with the bound ("min" or "max").
+        """Names of the parameters that are at a bound, each with the bound ("min" or "max").
 
         Args:
             point: dimensionless coordinates of the k free parameters, (k,).
@@ -128,12 +128,12 @@ class FitProblem:
 
 @dataclass(frozen=True, eq=False)
 class SmoothError:
-    """Smooth error of a model over operating points (a Gaussian process), which widens the errors of its parameters.
+    """Smooth error of a model over operating points (a Gaussian process), which adds to the errors of parameters.
 
     Args:
-        columns: change of the n whitened residuals of all tests by one standard deviation of each of q independent
-            patterns of the error, (q, n).
-        freedom: degrees of freedom that determine the standard deviation of the error.
+        columns: change of the n whitened residuals of all tests for each of q independent patterns of the error, at one
+            standard deviation, (q, n).
+        freedom: degrees of freedom of the estimated standard deviation of the error.
     """
 
     columns: Array
@@ -148,7 +148,7 @@ class FitResult:
         problem: least-squares problem; its tests have the weights at which the sum of squares is minimal.
         model: fitted model.
         residual: whitened residuals of the tests, model minus measured, then of the priors of the model, (n,).
-        jacobian: derivatives of the residuals by coordinate, (k, n).
+        jacobian: derivatives of the residuals with respect to the coordinates, (k, n).
         evaluations: number of model evaluations.
         at_bound: names of the parameters that ended at a bound, with the bound ("min" or "max").
         stopped: True if the fit was stopped before it converged.
@@ -187,7 +187,7 @@ class FitResult:
         return self.noise_weighted or self.problem.tests
 
     def stage(self, fixed: Collection[str] = ()) -> FitProblem:
-        """Problem of this fit for `covariance`, with its weights of the tests; the `fixed` parameters are not free."""
+        """Problem of this fit for `covariance`, with the weights of its tests; the `fixed` parameters are not free."""
         names = [name for name in self.names if name not in fixed]
         return replace(self.problem, tests=self.covariance_tests or self.problem.tests, names=names)
 
@@ -203,11 +203,11 @@ class FitResult:
 
     @property
     def flat(self) -> bool:
-        """True if the fall of chi-square expected from a further Gauss-Newton step is within chance."""
+        """True if a further Gauss-Newton step is expected to lower chi-square by no more than chance would."""
         return self.gain(self.at_bound) <= Z95**2 * max(self.chi_square / self.residual.size, 1.0)
 
     def gain(self, fixed: Collection[str]) -> float:
-        """Fall of chi-square expected from one Gauss-Newton step of all parameters except those named in `fixed`."""
+        """Fall of chi-square expected from one Gauss-Newton step of all parameters not named in `fixed`."""
         free = [i for i, name in enumerate(self.names) if name not in fixed]
         left_vectors, values, _ = np.linalg.svd(self.jacobian[free].T, full_matrices=False)
         significant = values > ROUNDING * values.max(initial=0.0)
@@ -222,7 +222,7 @@ class FitResult:
 
         Returns:
             Result with the new residuals and Jacobian, without an error shared by the tests; outliers and bounds are
-            those of this result.
+            copied from this result.
         """
         problem = replace(self.problem, tests=tests, shared_error=None)
         slopes = problem.jacobian(model)

@@ -1,4 +1,4 @@
-"""The fits a user asks for: static, dynamic, the two in turn, and all parameters together."""
+"""Fit procedures: static, dynamic, both in turn (the paper's two steps), and all parameters together."""
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -113,7 +113,7 @@ def fit_joint(
 def fit_static(data: PreparedCampaign, springpot: Result | None = None) -> Result:
     """Fit mu, sigma_fmax and eps_half to the loops, with the springpot fixed (paper, section 4.1).
 
-    m and alpha are those of `springpot`, or else of the campaign's [fit] if it gives both. Otherwise the springpot is
+    m and alpha are taken from `springpot`, or from the campaign's [fit] if it gives both. Otherwise the springpot is
     left out, and a warning states the effect.
 
     Args:
@@ -150,7 +150,7 @@ def fit_dynamic(data: PreparedCampaign, static: Result) -> Result:
 
 
 def given_static(data: PreparedCampaign) -> Result | None:
-    """Static result with mu, sigma_fmax and eps_half as fixed in the campaign's [fit]; None if one is not fixed."""
+    """Static result with mu, sigma_fmax and eps_half fixed in the campaign's [fit]; None unless all are fixed."""
     free = data.free(STATIC)
     fixed = {name: value for name, value in data.given_values.items() if name in STATIC and name not in free}
     if len(fixed) < len(STATIC):
@@ -209,7 +209,7 @@ def _fit_without_springpot(data: PreparedCampaign) -> FitResult:
 
 
 def _springpot_warning(data: PreparedCampaign, static: FitResult) -> str:
-    """Warning that states by how many per cent leaving the springpot out changed the static parameters."""
+    """Warning that states by how many per cent the static parameters changed because the springpot was left out."""
     values, two_step = static.model.values, None
     with suppress(FitError):  # no sweep, or none that goes with the loops
         two_step = fit_two_step(data).result
@@ -256,7 +256,7 @@ def _result(
         steps: fits of the procedure, in order.
         fixed: covariance of parameters that all steps kept fixed; None if these are exact.
         notes: sentences to report in addition.
-        unused: tests that no step fitted, which the model is compared with.
+        unused: tests that no step fitted, to compare the model with.
     """
     model, tests = steps[-1].model, [test for step in steps for test in step.data_sets]
     outliers = tuple(outlier for step in steps for outlier in step.outliers)
@@ -297,10 +297,10 @@ def build_result(
     Args:
         steps: fits of a procedure, in order.
         bounds: limits of parameters that the campaign gives, by name [SI].
-        model: model to report, such as that of the last fit with a smooth correction; None for that of the last fit.
+        model: model to report, such as the last fitted model with a smooth correction; None for the last fitted model.
         fixed: covariance of parameters that all fits kept fixed; None if these are exact.
         notes: warnings to report before those of the fits.
-        unused: tests that no fit used, which the model is compared with.
+        unused: tests that no fit used, to compare the model with.
         bounded_is_fixed: True to treat a parameter at a bound as fixed even if the model meets the tests.
         advice: text to append to the sentence on a misfit.
 

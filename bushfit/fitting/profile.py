@@ -1,8 +1,8 @@
-"""Profile likelihood: 95 % interval of one parameter, with the other parameters fitted again at each of its values.
+"""Profile likelihood: 95 % interval of one parameter, with the other parameters refitted at each of its values.
 
-A standard error assumes that chi-square is a parabola. The profile does not: one parameter is moved in steps, the
-others are fitted again at each step, and the interval ends where chi-square has risen by the allowed amount. Standard
-error and profile differ if a parameter is barely determined.
+A standard error assumes that chi-square is a parabola. A profile does not: one parameter is moved in steps, the others
+are refitted at each step, and the interval ends where chi-square has risen by the allowed amount. Standard error and
+profile differ if a parameter is barely determined.
 """
 
 from collections.abc import Mapping
@@ -51,7 +51,7 @@ class _Profile:
     Args:
         name: name of the parameter.
         best: fit of all parameters.
-        known: cache of fits of the others, by the coordinate of the parameter.
+        known: cache of fits of the other parameters, by the coordinate of this parameter.
     """
 
     name: str
@@ -59,7 +59,7 @@ class _Profile:
     known: dict[float, FitResult]
 
     def value(self, coordinate: float) -> float:
-        """Value of the parameter [SI] for a coordinate of the fit: ln of a positive parameter, else the parameter."""
+        """Value of the parameter [SI] for a coordinate of the fit, which is mostly its natural log."""
         (value,) = Coordinates.of_parameters(self.best.model, [self.name]).values([coordinate]).values()
         return float(np.clip(value, *self.best.model.parameters[self.name].bounds))  # exp(log(bound)) may lie beyond it
 
@@ -79,7 +79,7 @@ class _Profile:
         return float(np.sqrt(max(self.fitted(coordinate).chi_square - self.best.chi_square, 0.0)))
 
     def find_limit(self, start: float, bound: float, step: float, allowed: float) -> float | None:
-        """Find an end of an interval [SI], where the root of the rise of chi-square is `allowed`; None if it is open.
+        """Find one end [SI] of the interval: the root of the rise of chi-square is `allowed`; None if there is no end.
 
         Args:
             start: coordinate of the best value.
@@ -105,18 +105,18 @@ class _Profile:
 def profile95(best: FitResult, covariance: Covariance) -> Mapping[str, Interval]:
     """95 % intervals of the fitted parameters by profile likelihood.
 
-    Residuals are in units of noise, so the allowed rise of chi-square is 3.84 for 95 %, without an F-test. Errors that
-    only the covariance includes (of an estimated noise, of a model that misses the data) widen the profile by the same
-    factor as the symmetric interval: chi-square may rise by the square of half that interval's width over the linear
-    standard error.
+    Residuals are in units of noise, so the allowed rise of chi-square is 3.84 for 95 %, without an F-test. The
+    covariance also includes errors of an estimated noise, and of a model that misses the data. They widen the profile
+    by the same factor as the symmetric interval: the allowed rise is the square of (half the width of that interval /
+    linear standard error).
 
     Args:
         best: result of the fit.
         covariance: covariance of the fitted parameters.
 
     Returns:
-        Lower and upper end [SI] by name; None for a side that the data leave open up to the bound, or limit only far
-        away and by a bound of another parameter.
+        Lower and upper end [SI] by name; None for a side on which the data set no limit before the bound, or one that
+        is far away and due to a bound of another parameter.
 
     Raises:
         FitError: fewer than two parameters were fitted.

@@ -1,8 +1,8 @@
 """Noise of one line of a sweep, from the differences of repeats, or about a smooth curve without repeats.
 
-A line is the set of points, repeats included, at one held amplitude (frequency is stepped) or one held frequency
-(amplitude is stepped). Errors are those of ln K = ln|K| + i phase, so gain errors are real and phase errors imaginary,
-both relative to |K|.
+A line is the set of points, repeats included, at one constant amplitude (frequency is stepped) or one constant
+frequency (amplitude is stepped). Errors are errors of ln K = ln|K| + i phase, so gain errors are real and phase errors
+imaginary, both relative to |K|.
 """
 
 from collections import defaultdict
@@ -69,7 +69,7 @@ class LineNoise:
 
 
 def line_noise(sweep: Sweep, log_stiffness: Array, held_value: float, disturbed: Collection[float] = ()) -> LineNoise:
-    """Estimate the noise of a line of a sweep (its runs at one held value), from repeats or about a smooth curve.
+    """Estimate the noise of a line of a sweep (its runs at one constant value), from repeats or about a smooth curve.
 
     Args:
         sweep: measured sweep.
@@ -110,7 +110,7 @@ def difference_freedom(steps: int) -> float:
 
 
 def _is_typical(difference: Array, log_step: Array) -> Array:
-    """Mask of the steps at which the difference of two repeats is no outlier, (n,).
+    """Mask of the steps at which the difference of two repeats is not an outlier, (n,).
 
     The limit of an outlier is constant, or grows along the run if the differences do, by Theil's (1950) median slope.
 
@@ -162,10 +162,10 @@ def _about_smooth_curve(steps: Array, log_stiffness: Array) -> LineNoise:
 
 
 def disturbed_steps(lines: Iterable[LineNoise]) -> list[float]:
-    """Find frequencies or amplitudes at which sweeps without repeats scatter far more than at others, as by hum.
+    """Find frequencies or amplitudes at which sweeps without repeats scatter far more than elsewhere (mains hum).
 
     Args:
-        lines: noise of the lines (runs at one held value) of all sweeps.
+        lines: noise of the lines (runs at one constant value) of all sweeps.
 
     Returns:
         Frequencies [Hz] or amplitudes [m or rad].
@@ -184,7 +184,7 @@ def to_unit_interval(values: Array) -> Array:
 
 
 def _project_out(basis: Array, values: Array) -> Array:
-    """Project values, (n, m), orthogonally to the k functions of a curve, (n, k): independent residuals, (n - k, m)."""
+    """Independent residuals, (n - k, m), of values, (n, m), after a least-squares fit of k functions, (n, k)."""
     (reflections, factors), _ = qr(basis, mode="raw")
     turned, *_ = lapack.dormqr("L", "T", reflections, factors, values, lwork=values.shape[1])
     return np.asarray(turned[basis.shape[1] :])

@@ -1,4 +1,4 @@
-"""The class of a rig: size of the errors shared by a whole test, as stated in [rig] or as assumed."""
+"""Accuracy class of a rig: size of the errors shared by a whole test, as stated in [rig] or assumed."""
 
 import numpy as np
 

@@ -51,7 +51,7 @@ def list_outliers(
 
 
 def estimate(problem: FitProblem, *, robust: bool = False, lmfit: bool = False) -> FitResult:
-    """Fit to the end by least squares, or robustly by the loss soft_l1 without the outliers of sweeps.
+    """Solve a fit problem by least squares, or robustly by the loss soft_l1 without the outliers of sweeps.
 
     soft_l1 minimises the sum of 2 C^2 (sqrt(1 + (z/C)^2) - 1) over the distances z of the points in units of noise.
     The covariance is that of least squares with all weights equal to the efficiency of this loss under normal noise.

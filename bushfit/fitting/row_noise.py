@@ -5,11 +5,11 @@ filter, which subtracts from each row its prediction from the rows before, turns
 unit variance.
 
 Notes:
-    The model is fitted by the likelihood of the periodogram (Whittle 1953, Brockwell and Davis 1991, eq. 10.8.9) at
-    the frequencies between the cycle's harmonics, which no periodic motion makes: by the Yule-Walker equations, with
-    the power at harmonics taken from that between them, and the power below the lowest frequency seen from the model
-    (expectation and maximisation, Dempster, Laird and Rubin 1977), flat from half of it down. Rows count by their
-    number: an uneven clock changes nothing.
+    The model is fitted by the likelihood of the periodogram (Whittle 1953, Brockwell and Davis 1991, eq. 10.8.9) at the
+    frequencies between the harmonics of the cycle, where a periodic motion has no power. The Yule-Walker equations are
+    solved with the power at harmonics interpolated, and the power below the lowest observed frequency taken from the
+    model (expectation and maximisation, Dempster, Laird and Rubin 1977), constant below half that frequency. Rows are
+    assumed to be equally spaced, whatever their times.
 """
 
 from dataclasses import dataclass, field
@@ -49,8 +49,8 @@ class RowNoise:
         starts: matrix that whitens the first p rows, which have no p rows before them, (p, p).
         error: standard errors of the log of the variance, and of b_k/b_0, as independent columns, (p + 1, p + 1); None
             if not estimated.
-        observed_share: fraction of the variance of the whitened rows that is observed; the rest is the floor under the
-            spectrum.
+        observed_share: fraction of the variance of the whitened rows that is observed; the rest is an assumed minimum
+            of the spectrum.
         row_scale: standard deviation of a row of unit weight over the noise of a recorded row; above 1 for bins of
             correlated rows.
         breaks: indices of rows that do not depend on the row before: starts of bins averaged over other cycles.
@@ -74,7 +74,7 @@ class RowNoise:
         return max(1.0 / float(np.sum(self.filter)) ** 2, 1.0)
 
     def usable_rows(self, weight: Array) -> Array:
-        """Find the whitened rows to use: those whose row, and all preceding rows in its filter, have weight.
+        """Find the whitened rows to use: rows that have weight, as have all preceding rows in their filter.
 
         Returns:
             Mask, (n,).
@@ -104,14 +104,14 @@ class RowNoise:
         return white
 
     def noise_sensitivity(self, influence: Array) -> list[Array]:
-        """Change of the influence of the rows on k parameter estimates by an error of each parameter of the noise.
+        """Change of the influence of the rows on k parameter estimates due to an error of each parameter of the noise.
 
         Args:
             influence: weight of each whitened row in the estimates, (k, n).
 
         Returns:
-            For each parameter of the noise, the change by one of its standard errors, (k, n), which times the whitened
-            residuals is the change of the estimates; empty if these errors are not estimated.
+            For each parameter of the noise, the change due to one standard error of that parameter, (k, n); multiplied
+            by the whitened residuals, it is the change of the estimates. Empty if these errors are not estimated.
 
         Notes:
             For V = L^-1 L^-T with the filter L, the whitened derivative is -(G + G^T) with G = dL L^-1.
@@ -184,7 +184,7 @@ def noise_harmonics_of_single_cycle(number: Array) -> Array:
 
 
 def _periodogram(rows: Array) -> Array:
-    """Power of rows, (n,), at their n // 2 + 1 frequencies, no smaller than rounding errors."""
+    """Power of rows, (n,), at their n // 2 + 1 frequencies, at least as large as rounding errors."""
     power = np.abs(np.fft.rfft(rows)) ** 2 / rows.size
     return np.maximum(power, np.finfo(float).eps * power.mean())  # of cycles that repeat exactly, rounding
 

@@ -1,4 +1,4 @@
-"""Errors that several residuals share, which make them correlated: the residuals must be whitened together."""
+"""Errors that several residuals share. The residuals are then correlated and must be whitened together."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ class SharedErrors:
     """Independent errors that each change several residuals, such as the gain error of a run or of a loop.
 
     Args:
-        directions: changes of the n residuals, in units of noise, by r independent errors, as orthonormal columns, (n,
-            r); a sparse array for very many groups.
+        directions: changes of the n residuals, in units of noise, due to r independent errors, as orthonormal columns,
+            (n, r); a sparse array for very many groups.
         deviations: standard deviation of the change along each direction, (r,).
 
     Notes:
@@ -34,7 +34,7 @@ class SharedErrors:
 
     @classmethod
     def from_columns(cls, columns: Array) -> SharedErrors:
-        """Build errors from the changes of the n residuals by one standard deviation of each of q errors, (q, n)."""
+        """Build errors from the changes of n residuals due to one standard deviation of each of q errors, (q, n)."""
         variance, mixed = np.linalg.eigh(columns @ columns.T)
         significant = variance > _ROUNDING * variance.max(initial=0.0)
         deviations = np.sqrt(variance[significant])
@@ -46,7 +46,7 @@ class SharedErrors:
 
         Args:
             group: index of the group of each point, (n,).
-            change: change of the gain residuals, then of the phase residuals, by an error of 1, (2 n,).
+            change: change of the gain residuals, then of the phase residuals, due to an error of 1, (2 n,).
             deviations: standard deviations of the gain and the phase error of each group.
 
         Returns:
@@ -88,10 +88,10 @@ class SharedErrors:
         return np.asarray((rows @ self.directions * factors) @ self.directions.T)
 
     def covariance(self, influence: Array) -> Array:
-        """Covariance of k estimates by the shared errors, (k, k).
+        """Covariance of k estimates due to the shared errors, (k, k).
 
         Args:
-            influence: change of each estimate by a unit of each residual, (k, n).
+            influence: change of each estimate per unit of each residual, (k, n).
         """
         changes = influence @ self.directions * self.deviations
         return np.asarray(changes @ changes.T)

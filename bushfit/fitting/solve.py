@@ -1,4 +1,4 @@
-"""Least-squares fits with lmfit, as the paper's procedure makes them."""
+"""Least-squares fits with lmfit, for the paper's procedure."""
 
 from __future__ import annotations
 

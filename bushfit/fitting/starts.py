@@ -1,7 +1,7 @@
 """Start values of a fit, estimated from the tests: secant slope, loop area, slope over log f.
 
 Start values need only have the right order of magnitude: from values up to ten times too small or too large, 94 of 100
-fits end at the same minimum; the others, all far too stiff, lose a branch, which a warning reports.
+fits end at the same minimum. The other 6 start far too stiff and lose a branch, which a warning reports.
 """
 
 from collections.abc import Mapping, Sequence
@@ -55,8 +55,8 @@ def start_values(
 
     Notes:
         - eps_half from the largest strain reached;
-        - sigma_fmax from the loss of the slowest test, which is a loop's area: W = pi X^2 K'';
-        - mu from the slope (secant of a loop's fundamental) of the slowest test, less what friction adds;
+        - sigma_fmax from the loss of the slowest test, by the area of a loop, W = pi X^2 K'';
+        - mu from the slope (secant of a loop's fundamental) of the slowest test, minus the part of friction;
         - alpha from the slope of ln K'' over ln f, m from the growth of K' over ln f.
     """
     frequency, strain = operating_conditions(bushing, data_sets)

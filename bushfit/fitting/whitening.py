@@ -1,13 +1,13 @@
 """Covariance of a sweep's deviations: scatter from point to point, and errors shared by a block or a line.
 
-A block is a run: the points of one recording at one held amplitude or frequency. A line is the set of the runs with the
-same held value.
+A block is a run: the points of one recording at one constant amplitude or frequency. A line is the set of all runs with
+the same constant value.
 
 Notes:
     Within a block of points with scatter s_i and a shared error t the covariance is V = diag(s_i^2) + t^2 1 1^T. All
     runs of a line may also share an error, u^2 1 1^T over the line. A deviation is whitened by dividing it by s_i and
     removing the error shared by its block; then the error shared by its line is removed in the same way. A point of
-    weight w has s_i^2 = s^2/w; a point of weight 0 has no effect, on shared errors either. Gains and phases are
+    weight w has s_i^2 = s^2/w; a point of weight 0 has no effect, not even on shared errors. Gains and phases are
     independent: deviations are real, (..., 2 n), gains first.
 """
 
@@ -24,11 +24,11 @@ from bushfit.fitting.shared_errors import SharedErrors
 
 @dataclass(frozen=True, eq=False)
 class Whitening:
-    """Covariance of the deviations (residuals in gain and phase) of a sweep by its noise, to whiten them.
+    """Covariance matrix of the noise of a sweep's deviations (residuals in gain and phase), to whiten them.
 
     Args:
         run: index of the run (block) of each point, from 0, (n,).
-        line: index of the line (runs with one held value) of each point, from 0, (n,).
+        line: index of the line (runs with one constant value) of each point, from 0, (n,).
         random: standard deviation of the gain and phase of each point at full weight, (2, n).
         noise: noise of the campaign's sweeps: shared errors, and degrees of freedom of the estimates.
         weights: weight of each point, 0 to 1, (n,).
@@ -77,9 +77,9 @@ class Whitening:
             Sensitivity by identifier of the noise variance, (k, 2 n) each; see `MeasuredLoop.noise_sensitivity`.
 
         Notes:
-            Within a block V has the derivatives I by s^2 and 1 1^T by t^2, whitened W^2 and (W 1)(W 1)^T. The estimate
-            of t^2 is a mean of `freedom` squares with expectation t^2 + s^2/n; its error is limited to t^2. The same
-            applies to errors shared by lines.
+            Within a block the derivatives of V are I with respect to s^2 and 1 1^T with respect to t^2; whitened, W^2
+            and (W 1)(W 1)^T. The estimate of t^2 is a mean of `freedom` squares with expectation t^2 + s^2/n; its error
+            is limited to t^2. The same applies to errors shared by lines.
         """
         runs, lines, noise = self.runs, self._lines, self.noise
         rows, reactions = lines.whiten(influence), {}
@@ -115,5 +115,5 @@ class Whitening:
 
     @cached_property
     def _run_of_residual(self) -> Array:
-        """Index of the run of each gain and, after those of all gains, of each phase, (2 n,)."""
+        """Index of the run of each residual: of n gains, then of n phases, (2 n,)."""
         return np.concatenate((self.run, self.run + self.run.max() + 1))
