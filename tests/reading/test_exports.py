@@ -1,6 +1,7 @@
 """Files as laboratories write them, through the command line: read with the right values, or asked about."""
 
 import json
+import tomllib
 from collections.abc import Iterator, Mapping
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -8,17 +9,16 @@ from typing import Any
 
 import numpy as np
 import openpyxl
+import pandas as pd
 import pytest
 import scipy.io
 from commandline import typing
-from export_tables import AMPLITUDE, DISPLACEMENT, FORCE, FREQUENCY, STIFFNESS, TIME
-from exports import EXPORTS
 
 from bushfit.campaign.campaign import load_campaign
 from bushfit.reading.measurement import Loop, Sweep
 
-SWEEP = {"frequency": FREQUENCY, "amplitude": 1e-3 * AMPLITUDE, "stiffness": 1e3 * STIFFNESS}
-LOOP = {"time": TIME, "displacement": 1e-3 * DISPLACEMENT, "force": FORCE}
+FILES = Path(__file__).parents[1] / "files" / "exports"
+CASES = tomllib.loads((FILES / "cases.toml").read_text(encoding="utf-8"))
 BUSHING = '[bushing]\nname = "B"\ninner_radius = "10 mm"\nouter_radius = "18 mm"\nlength = "34 mm"\n\n'
 
 
@@ -49,37 +49,56 @@ def check(measured: Loop | Sweep, reference: Mapping[str, np.ndarray], tolerance
             np.testing.assert_allclose(found, values, rtol=2e-6, atol=2e-5 * np.abs(values).max())
 
 
-@pytest.mark.parametrize("name", EXPORTS)
-def test_an_export_is_read_right_or_raises_a_question(name, tmp_path):
-    export = EXPORTS[name]
-    file = tmp_path / export.name
-    file.write_bytes(export.content if isinstance(export.content, bytes) else export.content.encode())
-    if export.kind is None:
-        done = typing(tmp_path)(
-            "inspect", file.name, *options({"direction": "axial", **export.stated}), "--json", status=2
-        )
-        assert [word for word in export.words if word not in done.stderr] == []
-        assert [path.name for path in tmp_path.iterdir()] == [file.name]
+def expected(name: str) -> dict[str, np.ndarray]:
+    """True columns of a test in SI units, with its complex stiffness."""
+    columns = {key: column.to_numpy() for key, column in pd.read_csv(FILES / "expected" / f"{name}.csv").items()}
+    if "storage" in columns:
+        columns["stiffness"] = columns.pop("storage") + 1j * columns.pop("loss")
+    return columns
+
+
+#: Three cycles of 1 mm at 0.1 Hz, in seconds, millimetres and newtons.
+LOOP = expected("loop")
+TIME, DISPLACEMENT, FORCE = LOOP["time"], 1e3 * LOOP["displacement"], LOOP["force"]
+
+
+@pytest.mark.parametrize("case", CASES.values(), ids=CASES)
+def test_an_export_is_read_right_or_raises_a_question(case, tmp_path):
+    content, name = (FILES / case["file"]).read_bytes(), case.get("name", "export.txt")
+    if "head" in case:
+        content = "\n".join(case["head"]).encode() + content[content.index(b"\n") :]
+    (tmp_path / name).write_bytes(content)
+    says, stated = case.get("says", ()), case.get("stated", {})
+    if case["kind"] == "question":
+        done = typing(tmp_path)("inspect", name, *options({"direction": "axial", **stated}), "--json", status=2)
+        assert [words for words in says if words not in done.stderr] == []
+        assert [path.name for path in tmp_path.iterdir()] == [name]
         return
-    document, tests = inspected(tmp_path, file.name, **export.stated)
+    document, tests = inspected(tmp_path, name, **stated)
     notes = " | ".join(text for seen in document["files"] for text in (*seen["odd"], *seen["facts"].values()))
-    assert [word for word in export.words if word not in notes] == []
-    assert {seen["kind"] for seen in document["files"]} == {export.kind}
+    assert [words for words in says if words not in notes] == []
+    assert {seen["kind"] for seen in document["files"]} == {case["kind"]}
     assert tests
     for test in tests:
-        usual = LOOP if isinstance(test, Loop) else SWEEP
-        check(test, export.reference or usual, 0.06 if "spread" in notes else 2e-3)
+        check(test, expected(case.get("expected", case["kind"])), 0.06 if "spread" in notes else 2e-3)
+
+
+def test_a_ripple_of_half_a_percent_is_no_test_of_its_own(tmp_path):
+    time = np.arange(15_000) * 2e-3
+    phase = 0.2 * np.pi * time
+    columns = time, np.sin(phase) + 0.005 * np.sin(250.0 * phase), 1000.0 * np.sin(phase + 0.1)
+    header = "time [s],displacement [mm],force [N]"
+    np.savetxt(tmp_path / "hum.csv", np.array(columns).T, "%.6f", ",", header=header, comments="")
+    document, (test,) = inspected(tmp_path, "hum.csv")
+    assert document["files"][0]["facts"]["frequency"] == "0.1 Hz, a sine"
+    check(test, {"displacement": 1e-3 * columns[1], "force": columns[2]})
 
 
 @pytest.mark.parametrize(
     ("name", "is_odd"), [("axial_20Hz.csv", False), ("axial_0.1Hz.csv", False), ("axial_5Hz.csv", True)]
 )
 def test_a_name_may_state_the_sampling_rate(name, is_odd, tmp_path):
-    (tmp_path / name).write_text(
-        EXPORTS["a static curve"].content.partition("\n")[0]
-        + "\n"
-        + "\n".join(f"{t:.9g}\t{x:.9g}\t{f:.9g}" for t, x, f in zip(TIME, DISPLACEMENT, FORCE, strict=True))
-    )
+    (tmp_path / name).write_bytes((FILES / "plain_loop.txt").read_bytes())
     document, _ = inspected(tmp_path, name)
     assert any("the name states" in sentence for sentence in document["files"][0]["odd"]) == is_odd
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from datetime import datetime
+from decimal import Decimal
 from pathlib import Path
 from typing import Any, get_args
 
@@ -11,7 +12,6 @@ import openpyxl
 import pandas as pd
 import pytest
 import xlwt
-from dialects import HEADERS, NUMBERS, UNITS
 from odf.opendocument import OpenDocumentSpreadsheet
 from odf.table import Table, TableCell, TableRow
 from odf.text import P
@@ -27,6 +27,18 @@ from bushfit.reading.tablefile import Form, ending, escape_formula, to_bytes, to
 from bushfit.simulation.files import raw_loop_table, raw_sweep_table
 
 Sheets = dict[str, list[list[object]]]
+CYCLES = np.linspace(0.0, 4.0 * np.pi, 60)
+NUMBERS = {
+    "loop": [
+        [Decimal(f"{20.0 + 100.0 * p:.3f}"), Decimal(f"{2 * np.sin(p):.4f}"), Decimal(f"{12000 * np.sin(p + 0.1):.2f}")]
+        for p in CYCLES
+    ],
+    "sweep": [[Decimal(f), Decimal("0.1"), Decimal(2345 + 7 * f), Decimal("0.12")] for f in (5, 15, 25, 35)],
+}
+HEADERS: dict[str, list[object]] = {
+    "loop": ["Zeit [s]", "Weg [mm]", "Kraft [N]"],
+    "sweep": ["Frequenz [Hz]", "Amplitude [mm]", "Dynamische Steifigkeit [N/mm]", "Verlustfaktor [-]"],
+}
 FORCE = np.array([float(row[2]) for row in NUMBERS["loop"]])
 PREAMBLE: list[list[object]] = [["Maschine", "EL-7"], ["Datum", "01.02.2026"], ["Version", 1.234], []]
 FORMS: tuple[Form, ...] = get_args(Form)
@@ -38,10 +50,8 @@ RUN = ["=1+1", "+cmd", "-2+3", "@SUM(A1)", "\t=1", "  =1", '=HYPERLINK("http://x
 STAY = ["loop_axial_1", "0.1 mm", "a=b", "A-4", "", "'quoted'", "Prüfling 3"]
 
 
-def table(kind: Any, language: str = "german", number: Callable[[Any], object] = float) -> list[list[object]]:
-    names = HEADERS[language][kind].split(", ")
-    headers: list[object] = [f"{name} [{unit}]" for name, unit in zip(names, UNITS[kind], strict=True)]
-    return [headers, *([number(cell) for cell in row] for row in NUMBERS[kind])]
+def table(kind: str, number: Callable[[Any], object] = float) -> list[list[object]]:
+    return [HEADERS[kind], *([number(cell) for cell in row] for row in NUMBERS[kind])]
 
 
 def with_comma(number: object) -> str:
