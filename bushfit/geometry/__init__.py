@@ -216,14 +216,14 @@ class Specimen(_TestObject):
 
     @property
     def motion(self) -> Motion:
-        """Kind of motion: that of the direction, translation of a block in shear, or strain of the material."""
+        """Kind of motion: translation or rotation (bushing), translation (block in shear), or strain (coupon)."""
         if self.axis:
             return self.axis.motion
         return TRANSLATION if self.kind == "shear" else STRAINING
 
     @property
     def body(self) -> str:
-        """Name of the body under test: of the bushing, or of the coupon."""
+        """Name of the body under test: the bushing or the coupon."""
         return self.bushing.name if self.bushing else self.name
 
     @property
@@ -254,7 +254,7 @@ def get_place(name: str, specimens: Iterable[Specimen]) -> Place:
 
 
 def get_places(name: str, specimens: Sequence[Specimen]) -> list[Place]:
-    """Return the directions and specimens with a name; of several bushings, a bushing or a direction names several.
+    """Directions and specimens with a name: one, or all of a bushing or a direction if there are several bushings.
 
     Raises:
         ModelError: no direction, specimen or bushing has this name.
@@ -275,8 +275,8 @@ def default_places(bushing: Bushing | None, specimens: Sequence[Specimen]) -> li
 def shared_labels(places: Iterable[Place]) -> list[str]:
     """List the names to which a search for missing effects may restrict an effect, without redundant ones.
 
-    Redundant are a body (bushing) tested in one direction only, beside this direction, and the first of two bodies: an
-    effect on it cannot be distinguished from the opposite effect on the second.
+    A bushing that was tested in one direction only is redundant with this direction. The first of two bodies is
+    redundant because an effect on it cannot be distinguished from the opposite effect on the second.
 
     Args:
         places: tested directions and specimens.
@@ -336,7 +336,7 @@ def stiffness_per_modulus(bushing: Bushing | None, place: Place) -> float:
 
 
 def strain_factor_of_files(place: Place) -> float:
-    """Factor from the strain or displacement in a test file to bushfit's: 2 for a tensor's shear strain, 1 otherwise.
+    """Factor that converts the strain or displacement of a test file: 2 for a tensor's shear strain, 1 otherwise.
 
     >>> strain_factor_of_files(Specimen("coupon", "modulus", "tensor")), strain_factor_of_files(Direction.AXIAL)
     (2.0, 1.0)
@@ -345,12 +345,12 @@ def strain_factor_of_files(place: Place) -> float:
 
 
 def bushing_at(bushing: Bushing | None, place: Place) -> Bushing | None:
-    """Bushing to which a direction or specimen belongs: `bushing` for a plain direction; None for a coupon."""
+    """Bushing to which a direction or specimen belongs: `bushing` for a direction of one bushing; None for a coupon."""
     return place.bushing if isinstance(place, Specimen) else bushing
 
 
 def _require_bushing(bushing: Bushing | None, place: Place) -> Bushing:
-    """Return the bushing to which a direction or specimen belongs; without one, raise a ModelError."""
+    """Return the bushing to which a direction or specimen belongs; raise a ModelError if there is none."""
     if (bushing := bushing_at(bushing, place)) is None:
         raise ModelError(
             "there is no bushing",

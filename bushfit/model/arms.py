@@ -1,7 +1,7 @@
-"""Maxwell arms (springs and dashpots in series) that replace viscoelastic branches in programs that step through time.
+"""Maxwell arms (spring and dashpot in series) that replace viscoelastic branches in programs for transient simulation.
 
-A springpot depends on the whole past motion, which most programs cannot store. Over a band of frequencies a few springs
-with dashpots in series (Maxwell arms) have the same modulus within a stated error.
+A springpot depends on the whole past motion, which most programs cannot store. Over a band of frequencies, a few
+Maxwell arms have the same modulus within a stated error.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -51,7 +51,8 @@ class Arms:
         time: relaxation times tau_k [s], (k,).
         band: lowest and highest frequency [Hz] of the approximation.
         error: largest relative error of the complex modulus in the band.
-        stands_for: names of the effects that the arms replace, such as "springpot"; empty for the whole rubber.
+        stands_for: names of the effects that the arms replace, such as "springpot"; empty if they replace the whole
+            rubber.
         size: name, in files and reports, of the model parameter that all moduli are proportional to; empty for none.
         conditions: temperature of the rubber; unknown for the reference temperature of the model.
 
@@ -219,7 +220,7 @@ def _starts(omega: Array, target: Array, arms: int) -> Iterator[tuple[Array, Arr
     Yields:
         Moduli [Pa] and relaxation times [s], (k,) each.
 
-    Notes: arms d apart in ln tau have G = 2/pi G''(1/tau) d, where the loss modulus G'' changes little (J. D. Ferry,
+    Notes: arms spaced by d in ln tau have G = 2/pi G''(1/tau) d if the loss modulus G'' changes little (J. D. Ferry,
     Viscoelastic Properties of Polymers, 3rd ed., 1980, ch. 4).
     """
     for overhang in _OVERHANGS:
@@ -242,7 +243,7 @@ def _fit(
         overhang_factor: factor by which relaxation times may lie outside the band.
         moduli: start moduli of the arms [Pa], (k,).
         time: start relaxation times [s], (k,).
-        rounds: number of fits, each with weights multiplied by the error of the last.
+        rounds: number of fits; the weights of each fit are multiplied by the errors of the fit before.
 
     Returns:
         Largest |error|/|total| over the frequencies, moduli [Pa] and relaxation times [s], (k,) each.

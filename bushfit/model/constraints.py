@@ -31,7 +31,7 @@ class Prior:
 
     Args:
         names: names of the k parameters.
-        mean: values [SI] by the earlier knowledge, (k,).
+        mean: expected values [SI], (k,).
         covariance: covariance of the errors of these values [SI], (k, k), positive definite.
         source: earlier knowledge as the user stated it, such as "0.24 +- 0.03".
     """
@@ -93,7 +93,7 @@ class Tie:
         """Value of the tied parameter, from parameter values [SI] by name.
 
         Returns:
-            Value [SI]; complex if a parameter value is.
+            Value [SI]; complex if a parameter value is complex.
 
         Raises:
             ModelError: the expression has no value, or no real value of real parameters.
@@ -133,7 +133,7 @@ def _interpreter() -> Any:
 
 @dataclass(frozen=True, eq=False)
 class Constraints:
-    """Constraints that hold in every fit of a model.
+    """Constraints that apply to every fit of a model.
 
     Args:
         priors: independent priors of parameters; a prior applies to those of its parameters that a model has.
@@ -149,7 +149,7 @@ class Constraints:
         return [tie for tie in self.ties if {tie.name, *tie.names} <= values.keys()]
 
     def tied_values(self, values: Mapping[str, Any]) -> dict[str, Any]:
-        """Parameter values [SI] by name, with those of tied parameters computed from the others."""
+        """Parameter values [SI] by name, with the values of tied parameters computed from the others."""
         tied = dict(values)
         for tie in self.active_ties(values):
             tied[tie.name] = tie.value(tied)

@@ -1,4 +1,4 @@
-"""The covariance of fitted parameters, and the widths of the intervals that follow from it."""
+"""Covariance of fitted parameters, and the widths of their confidence intervals."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -96,7 +96,7 @@ class Covariance:
         return np.maximum(2.0 / np.square(np.maximum(share, smallest)), _LEAST_FREEDOM)
 
     def correlations(self) -> list[tuple[str, str, float]]:
-        """Two names and the correlation (-1 to 1) for every pair of parameters, the largest magnitude first."""
+        """Names and correlation (-1 to 1) of every pair of parameters, the largest magnitude first."""
         sigma = np.sqrt(np.diag(self.matrix))
         pairs = [
             (self.names[i], self.names[j], float(self.matrix[i, j] / (sigma[i] * sigma[j])))
@@ -105,7 +105,7 @@ class Covariance:
         return sorted(pairs, key=lambda pair: -abs(pair[2]))
 
     def with_independent(self, names: tuple[str, ...], deviation: float) -> "Covariance":
-        """Add parameters of one standard deviation [their SI unit] that are independent of all others."""
+        """Add parameters with equal standard deviation [their SI unit] that are independent of all others."""
         variance, padding = np.diag([0.0] * len(self.names) + [deviation**2] * len(names)), (0, len(names))
         spread = tuple(np.pad(part, padding) for part in self.spread)
         return Covariance((*self.names, *names), np.pad(self.matrix, padding) + variance, spread)

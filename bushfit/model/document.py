@@ -1,7 +1,6 @@
-"""Keys of a model file (model.json, truth.json and the like), in the schema bushfit/model/1.
+"""Content of a model file (model.json, truth.json and similar files), in the schema bushfit/model/1.
 
-The dataclasses are the keys for the reader, the writer and the JSON Schema. Pydantic validates them and ignores other
-keys.
+The dataclasses define the keys for reader, writer and JSON Schema. Pydantic validates them and ignores other keys.
 """
 
 from collections.abc import Mapping
@@ -141,7 +140,7 @@ def _check_covariance(table: CovarianceTable) -> CovarianceTable:
 
 @dataclass(frozen=True)
 class FitTable(Quality):
-    """Entry of a model file on its fit: quality, ranges of the fitted tests, misfit by test, and expected error.
+    """Entry of a model file on the fit: quality, ranges of the fitted tests, misfit of each test, and expected error.
 
     Args:
         frequency_Hz: lowest and highest frequency [Hz].

@@ -123,7 +123,7 @@ def from_document(document: object, file: Path | None = None) -> Result:
 
 
 def _covariance(table: CovarianceTable, model: Model) -> Covariance:
-    """Read the covariance of the parameters of a model; raise a ModelError if it has parameters of another model."""
+    """Read the covariance of the parameters of a model; raise a ModelError if it contains other parameters."""
     if not set(table.names) <= model.parameters.keys():
         raise ModelError("the covariance does not belong to the parameters", place="covariance")
     matrix, *spread = (np.reshape(part, 2 * [len(table.names)]) for part in (table.matrix, *table.spread))
@@ -236,7 +236,7 @@ def versions() -> dict[str, str]:
 
 
 def _require_object(document: object, file: Path | None, kind: str) -> dict[str, Any]:
-    """Return parsed JSON that is an object; otherwise raise a ModelError that says it is not `kind`, "a model"."""
+    """Return parsed JSON if it is an object; otherwise raise a ModelError that names the `kind`, "a model"."""
     if isinstance(document, dict):
         return document
     found = _KINDS.get(type(document), "null")

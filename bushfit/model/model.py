@@ -1,4 +1,4 @@
-"""The model of a bushing: its geometry, the effects that its response is made of, and their values."""
+"""Model of a bushing: its geometry, the effects that make up its response, and their parameter values."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -31,7 +31,7 @@ FIVE = tuple(parameter.name for name in BASE for parameter in get_effect(name).p
 
 @dataclass(frozen=True)
 class Model:
-    """Immutable model of a bushing: its geometry, the effects that act, and one value per parameter.
+    """Immutable model of a bushing: its geometry, its effects, and one value for each parameter.
 
     Args:
         bushing: geometry; None for a compound that is known from specimens alone.
@@ -52,7 +52,7 @@ class Model:
     constraints: Constraints = field(default=UNCONSTRAINED, compare=False)
 
     def __post_init__(self) -> None:
-        """Compute the values of tied parameters, and check all values."""
+        """Compute the values of tied parameters, and check the values of all parameters."""
         object.__setattr__(self, "effects", tuple(self.effects))
         tied_values = self.constraints.tied_values(self.values)
         object.__setattr__(self, "values", MappingProxyType(tied_values))
@@ -110,7 +110,7 @@ class Model:
 
     @property
     def without_time_law(self) -> list[str]:
-        """Names of the effects that have a law of the steady first harmonic alone, and none in time."""
+        """Names of the effects with a law for the steady first harmonic only, and no law in time."""
         return [effect.name for effect in self.records if effect.harmonic_only]
 
     def require_time_law(self) -> None:

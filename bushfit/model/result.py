@@ -54,7 +54,7 @@ class PreloadRange:
 
     Args:
         place: name of the direction or specimen.
-        unit: SI unit of the preloads: that of a displacement, such as m, or that of a force, such as N.
+        unit: SI unit of the preloads, of a displacement (such as m) or of a force (such as N).
         low: smallest preload, in `unit`.
         high: largest preload, in `unit`.
         count: number of distinct preloads.
@@ -106,7 +106,7 @@ class Misfit:
         nrmse: root mean square difference of the complex stiffness relative to |K|, or of a loop's force relative to
             half its range.
         reduced_chi_square: mean square residual in units of noise.
-        gain: mean relative gap of |K|, measured minus model: positive if the test is stiffer than the model.
+        gain: mean relative difference of |K|, measured minus model: positive if the test is stiffer than the model.
     """
 
     test: str
@@ -161,7 +161,7 @@ class Outlier:
 
 @dataclass(frozen=True)
 class PriorUse:
-    """Part that the prior of a parameter has in its estimate.
+    """Influence of the prior of a parameter on its estimate.
 
     Args:
         source: prior as the campaign states it, such as "0.24 +- 0.03".
@@ -335,7 +335,7 @@ class Result:
 
     @property
     def undecided(self) -> list[str]:
-        """Warning, as a list of one sentence, that the tests do not rule out other models; empty if they do."""
+        """Warning that the tests do not rule out other models, as a list of one sentence; empty if they do."""
         if not self.alternatives:
             return []
         added = (sorted(set(alternative.model.effects) - {*self.model.effects}) for alternative in self.alternatives)
@@ -348,7 +348,7 @@ class Result:
 
     @property
     def fitted_places(self) -> list[Place]:
-        """Directions and specimens that were fitted, but not those of another bushing of the compound."""
+        """Directions and specimens that were fitted, except those of another bushing of the compound."""
         names = self.measured.directions if self.measured else ()
         places: dict[str, Place] = {str(place): place for place in (*Direction, *self.specimens)}
         return [places[name] for name in names if name in places]

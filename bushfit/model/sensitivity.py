@@ -2,8 +2,8 @@
 
 In a model of branches alone the derivatives of the branches add up: the paper's three branches have analytic
 derivatives, the others finite differences. With modifiers or layers, the derivatives are finite differences of the
-whole response, computed in one call with the parameter values along a leading axis. The differences are one-sided: half
-the cost of central differences, and accurate to a millionth, which is enough for a fit.
+whole response, computed in one call with the parameter values along a leading axis. The differences are one-sided,
+which halves the cost of central differences; their relative error of 1e-6 is small enough for a fit.
 """
 
 from collections.abc import Callable, Sequence
@@ -121,7 +121,7 @@ def _add_slopes(
         names: names of the parameters.
         branch: effect that adds a stress.
         respond: function of the parameter values and `test` that returns the branch's response, (n,).
-        sensitivities: the same for derivatives by parameter name; None for numerical derivatives.
+        sensitivities: function that returns the derivatives by parameter name; None for numerical derivatives.
         test: further arguments of both functions.
     """
     row = {name: i for i, name in enumerate(names)}

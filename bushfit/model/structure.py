@@ -1,4 +1,4 @@
-"""Structure of a model: its effects by kind, their parameters, and the values that each effect reads."""
+"""Structure of a model: its effects by kind, their parameters, and the parameter values that each effect uses."""
 
 from collections.abc import Mapping
 from functools import lru_cache
@@ -22,7 +22,7 @@ class Structure:
         viscoelastic: linear viscoelastic branches, whose steady responses add up harmonic by harmonic.
         modifiers: effects that change parameter values of other effects.
         layers: effects around the rubber, such as the rig, from the rubber outward.
-        moduli: names of the moduli and stresses; if all are scaled by a factor, so is the stiffness of the rubber.
+        moduli: names of the moduli and stresses, to which together the stiffness of the rubber is proportional.
 
     Raises:
         ModelError: an effect is unknown or listed twice.
@@ -58,7 +58,7 @@ structure_of = lru_cache(maxsize=256)(Structure)
 
 
 def values_for_effect(effect: Effect, values: Values) -> Values:
-    """Parameter values for the functions of an effect: all by full name, those of the effect also by short name."""
+    """Parameter values for the functions of an effect: all by full name, and its own values by short name as well."""
     if effect.name in BASE:
         return values
     return {**values, **{parameter.name: values[qualified_name(effect, parameter)] for parameter in effect.parameters}}

@@ -1,4 +1,4 @@
-"""The compound of a fitted model in another bushing, and the stiffness factor of a bushing without tests."""
+"""Transfer the compound of a fitted model to another bushing, with a stiffness factor for a bushing without tests."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -17,7 +17,7 @@ FACTOR_SPREAD = 0.03
 
 
 def factor_spread(result: Result) -> float | None:
-    """Standard deviation of the stiffness of bushings relative to their formula, from the priors of their factors.
+    """Relative standard deviation of the stiffness of bushings about their formula, from priors of their factors.
 
     Returns:
         Root mean square distance from 1 of the stiffness factors that the campaign's priors expect [1]; None if no

@@ -1,4 +1,4 @@
-"""95 % bands: errors of the parameters and of the model, and the span of the models that the tests do not rule out."""
+"""95 % bands of predictions: errors of parameters and model, over all models that the tests do not rule out."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ class Band:
 
     Args:
         value, low, high: prediction, and lower and upper end of its 95 % band, (n,) each.
-        root: changes of the quantity by r independent errors of one standard deviation, (r, n); their root sum of
-            squares is the standard error. r is 0 if the uncertainty is unknown.
+        root: changes of the quantity due to r independent errors of one standard deviation, (r, n). The standard error
+            is the root of the sum of their squares. r is 0 if the uncertainty is unknown.
     """
 
     value: Array
@@ -67,10 +67,10 @@ def car_models(model: Model, unresolved: Sequence[str]) -> list[Model]:
 
 
 def alternative_models(result: Result, *, rig: bool) -> Iterator[tuple[Result, Model]]:
-    """Yield each other model that the tests do not rule out, with or without the effects of the rig.
+    """Yield the alternatives to a fitted model that the tests do not rule out, with or without the effects of the rig.
 
     Yields:
-        The result with the errors of the other model, which has no model error; and the other model.
+        The result with the parameter errors of the alternative and without a model error; and the alternative model.
 
     Args:
         result: fitted result.
@@ -84,34 +84,34 @@ def alternative_models(result: Result, *, rig: bool) -> Iterator[tuple[Result, M
 
 
 def candidates(result: Result, *, rig: bool = False) -> list[tuple[Result, Model]]:
-    """List the models that agree with the tests, the predicted one first; a band spans the predictions of all.
+    """List the models that agree with the tests, the fitted model first; a band spans the predictions of all of them.
 
     Args:
         result: fitted result.
         rig: True to include the effects of the rig, as in the tests.
 
     Returns:
-        Models with the result that gives their errors: `car_models`, then `alternative_models`.
+        Pairs of a model and the result that contains its errors: `car_models`, then `alternative_models`.
     """
     models = [result.model] if rig else car_models(result.model, result.unresolved)
     return [*((result, model) for model in models), *alternative_models(result, rig=rig)]
 
 
 def envelope(bands: Sequence[Band]) -> Band:
-    """Band of the first of several predictions, widened to include the bands of the others."""
+    """Band of the first prediction, widened to include the bands of all other predictions."""
     low, high = (np.array([getattr(band, end) for band in bands]) for end in ("low", "high"))
     return replace(bands[0], low=low.min(axis=0), high=high.max(axis=0))
 
 
 @dataclass(frozen=True, eq=False)
 class Uncertainty:
-    """Errors of a prediction with one model: of its parameters, and of the model itself.
+    """Errors of a prediction with one model: errors of the parameters, and of the model itself.
 
     Args:
         covariance: covariance of the k uncertain parameters of the model.
-        scale: factor by which to multiply the errors of the parameters at each point, (n,): 1, or less within the
-            tested range if there is an error of the model, which replaces them.
-        relative: complex relative errors of the stiffness by e independent errors of the model, (e, n).
+        scale: factor for the parameter errors at each point, (n,): 1; less within the tested range if the result has an
+            error of the model, which replaces parameter errors.
+        relative: complex relative changes of the stiffness due to e independent errors of the model, (e, n).
     """
 
     covariance: Covariance
@@ -123,8 +123,8 @@ class Uncertainty:
 
         Args:
             value: the quantity, (n,).
-            slopes: derivatives with respect to the k uncertain parameters, then changes due to one standard deviation
-                of each of the e errors of the model, (k + e, n).
+            slopes: derivatives with respect to the k uncertain parameters; then changes due to one standard deviation
+                of each of e errors of the model, (k + e, n).
         """
         count = len(self.covariance.names)
         half = np.hypot(
@@ -148,10 +148,10 @@ def uncertainty(
         conditions: temperature of the rubber.
 
     Returns:
-        Errors. An unnamed correction or a model error adds an error of the real and one of the imaginary part; within
-        the measured range these replace the errors of the parameters, but not those of effects that `model` lacks: the
-        measured stiffness without an effect is as uncertain as the effect. An untested direction of a bushing has the
-        model error of the tested ones at equal strain.
+        Errors of parameters and model. An unnamed correction or a model error adds an error of the real and an error of
+        the imaginary part. Within the measured range these replace the errors of the parameters, except the errors of
+        effects that `model` lacks: the measured stiffness minus an effect is as uncertain as the effect. An untested
+        direction of a bushing gets the model error of the tested directions at equal strain.
     """
     names = [name for name in result.covariance.names if name in model.values]
     covariance = result.covariance.restricted(names)

@@ -1,6 +1,6 @@
-"""Warnings of a prediction: directions not fitted, extrapolation and omitted effects, with the meaning of each warning.
+"""Warnings of a prediction, on directions not fitted, extrapolation and omitted effects, with their consequences.
 
-Every warning of the package, wherever it is written, has its meaning for the use of the numbers in `uses.toml`.
+For every warning of the package, `uses.toml` states the consequence for the use of the predicted numbers.
 """
 
 import re
@@ -48,7 +48,7 @@ _AGREEMENT = 1.4
 
 
 def consequence_of(warning: str) -> str:
-    """Return the sentence of `uses.toml` on what a warning means for the use of the numbers."""
+    """Return the sentence of `uses.toml` that states the consequence of a warning for the use of the numbers."""
     return next(use for pattern, use in _USES.items() if re.search(pattern, warning))
 
 
@@ -76,7 +76,7 @@ def warnings_of(result: Result, predicted: Iterable[Iterable[str]] = (), notes: 
 
 
 def caveats(result: Result) -> list[str]:
-    """List the warnings about a result itself, independent of any prediction.
+    """List the warnings about a fitted result that apply to every prediction.
 
     Args:
         result: fitted result.
@@ -116,7 +116,7 @@ def rig_effects(result: Result) -> list[str]:
 
 
 def agrees_within_noise(result: Result, direction: Place) -> bool:
-    """True if a direction has measured sweeps that were not fitted, and the model misses none by more than noise."""
+    """True if a direction has sweeps that were not fitted and the model agrees with all of them within noise."""
     misfits = [test for test in result.tests if test.place == str(direction) and test.held is None and not test.fitted]
     return bool(misfits) and all(test.reduced_chi_square <= _AGREEMENT for test in misfits)
 

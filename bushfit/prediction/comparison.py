@@ -1,7 +1,7 @@
 """Comparison of two fitted results: differences of parameters, stiffness and loss factor, and their significance.
 
-The errors of the two results are taken as independent. Errors that both share, such as the gain of one transducer, make
-the intervals of the differences too wide as a rule.
+The errors of the two results are assumed to be independent. If the results share errors, such as the gain of one
+transducer, the intervals of the differences are usually too wide.
 """
 
 from __future__ import annotations
@@ -61,8 +61,8 @@ class Comparison:
 
     Args:
         parameters: comparisons of the parameters that both results have.
-        joint: probability by chance of the differences of all parameters together, and the number of differences; None
-            if no parameter is tested.
+        joint: probability that chance causes the differences of all parameters together, and the number of differences;
+            None if no parameter is tested.
         contrasts: differences of the dynamic stiffness, one for each direction or specimen.
         shared: names of the files to which both results were fitted.
     """
@@ -83,10 +83,10 @@ class Comparison:
 
     @cached_property
     def largest_errors(self) -> Array:
-        """Largest error of all bands, over the half width of its pointwise 95 % band, in random draws (fixed seed).
+        """Largest error over all points, in half widths of the pointwise 95 % band, in random draws (fixed seed).
 
         Notes: the correlations of the errors are known (T. Hothorn, F. Bretz, P. Westfall, Biometrical J. 50 (2008)
-        346). One draw of 0 if no error is known.
+        346). If no error is known, a single draw of 0.
         """
         roots = [band.root for band in self.bands.values()]
         if not roots or not len(roots[0]):
@@ -120,7 +120,7 @@ class Comparison:
 
     @property
     def differing(self) -> list[str]:
-        """Names of stiffnesses, loss factors and parameters that differ: none for at least 95 % of equal bushings.
+        """Names of stiffnesses, loss factors and parameters that differ significantly (false alarms: at most 5 %).
 
         Notes: Hochberg's procedure (Biometrika 75 (1988) 800) for two tests, of all points and of all parameters: a
         test is significant if both are at 5 %, or if it is at 2.5 %.
@@ -169,7 +169,7 @@ def compare(
         places: pairs of directions or specimens to compare: of the reference, and of the compared result. Both have the
             same kind of motion.
         grids: frequencies [Hz] and zero-to-peak amplitudes [m, rad or 1] of each pair.
-        preloads: preload of each pair, where None selects the tested preload nearest to zero; by default, so for all.
+        preloads: preload of each pair; None for the tested preload nearest to zero, which is the default for all pairs.
 
     Returns:
         Comparison over the common parameters and the grids.
@@ -191,17 +191,18 @@ def compare(
 
 
 def with_model_patterns(result: Result, predictions: Sequence[Prediction]) -> list[Prediction]:
-    """Give the error of the model the correlation between operating points that its Gaussian process has.
+    """Correlate the error of the model between operating points, as its Gaussian process does.
 
-    A prediction has two such errors, of the real and imaginary part, which are the same number at all points. Here each
-    is a sum of patterns over frequency and strain (see `gaussian_process.patterns`), independent between directions.
+    In a prediction the error of the real part is one random number for all points, and so is that of the imaginary
+    part. Here each becomes a sum of patterns over frequency and strain (see `gaussian_process.patterns`), independent
+    between directions.
 
     Args:
         result: fitted result.
         predictions: predictions of the result, one per direction or specimen.
 
     Returns:
-        Predictions with such errors in `stiffness` and `loss_factor`; unchanged without an error of the model.
+        Predictions with correlated errors in `stiffness` and `loss_factor`; unchanged without an error of the model.
     """
     process, shapes = result.model.unnamed or result.model_error, list[Array]()
     if not process:
@@ -213,7 +214,7 @@ def with_model_patterns(result: Result, predictions: Sequence[Prediction]) -> li
     ends = np.cumsum([prediction.frequency.size for prediction in predictions])[:-1]
 
     def spread(band: Band, shape: Array) -> Band:
-        """Replace the two errors of the model, one number at all n points, by one for each of q patterns, (q, n)."""
+        """Replace the two errors of the model, each equal at all n points, by errors in each of q patterns, (q, n)."""
         errors = (shape[:, None] * band.root[-2:]).reshape(-1, shape.shape[1])
         return replace(band, root=np.concatenate((band.root[:-2], errors)))
 

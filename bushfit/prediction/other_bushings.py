@@ -1,4 +1,4 @@
-"""How well each of several bushings is predicted by a fit to the others."""
+"""Cross-validation of several bushings: predict each bushing by a fit to the others."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -24,9 +24,9 @@ class OtherBushings:
     Args:
         bushing: name of the bushing.
         points: number of operating points of its tests.
-        nrmse: root mean square error of the prediction, relative to |K|, or of a loop to half its range of force.
+        nrmse: root mean square error of the prediction, relative to |K|, or for a loop to half its force range.
         reduced_chi_square: mean square error in units of noise.
-        gain: mean relative gap of |K|, measured minus predicted.
+        gain: mean relative difference of |K|, measured minus predicted.
         share_inside: share of the points whose |K| is in the 95 % band of prediction and noise, 0 to 1.
     """
 
@@ -43,7 +43,7 @@ def predict_each_bushing(
 ) -> list[OtherBushings]:
     """Cross-validate several bushings: predict the tests of each by a model that is fitted to the others.
 
-    If the factors of bushings are free, the band includes their spread.
+    If the model has a free stiffness factor for each bushing, the band includes the spread of these factors.
 
     Args:
         data: prepared campaign.
@@ -51,7 +51,7 @@ def predict_each_bushing(
         directions: directions, specimens or bushings whose tests to use; see `PreparedCampaign.select_tests`.
 
     Returns:
-        Agreement for each bushing; empty if the tests are of fewer than two.
+        Agreement for each bushing; empty for tests of fewer than two bushings.
     """
     tests = data.select_tests(directions)
     places = [test.direction for test in tests if isinstance(test.direction, Specimen) and test.direction.bushing]

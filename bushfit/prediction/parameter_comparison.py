@@ -1,6 +1,6 @@
-"""Comparison of the parameters of two fitted results: differences, their significance one by one and all together.
+"""Comparison of the parameters of two fitted results: differences, and their significance singly and together.
 
-The errors of the two results are taken as independent.
+The errors of the two results are assumed to be independent.
 """
 
 from __future__ import annotations
@@ -67,8 +67,8 @@ def compare_parameters(
             m (2 pi f)^alpha.
 
     Returns:
-        Comparison of each parameter, and the probability by chance of all differences together with their number, or
-        None if no parameter is tested.
+        Comparison of each parameter; and the probability that chance causes all differences together, with their
+        number, or None if no parameter is tested.
 
     Notes: strictly positive parameters are compared by their logarithm. The unit of m depends on alpha, so m itself is
     comparable only at equal alpha; the modulus is comparable at any alpha.
@@ -119,7 +119,7 @@ def compare_parameters(
 
 
 def exponent_of(name: str, parameter: Parameter) -> str | None:
-    """Name of the exponent in the unit of a parameter, also a parameter: "alpha" for m [Pa s^alpha]; None without."""
+    """Name of the parameter that is the exponent in another's unit: "alpha" for m [Pa s^alpha]; None without one."""
     match = _EXPONENT.search(parameter.unit)
     return match and "".join(name.rpartition(".")[:2]) + match[1]
 

@@ -43,9 +43,9 @@ class PredictedResonance:
         amplitude: zero-to-peak deformation of the bushing [m], (n,).
         transmissibility: complex ratio of the accelerations of mass and base [-], (n,).
         stiffness: complex stiffness of the bushing at each frequency and amplitude [N/m], (n,).
-        warnings: sentences on a direction, and on frequencies and strains near the peak, that were not fitted, and on
-            unresolved effects.
-        if_rigs: response at these frequencies if the unresolved effects belong to the rig; None without such effects.
+        warnings: sentences on a direction that was not fitted, on frequencies and strains near the peak outside the
+            fitted range, and on unresolved effects.
+        if_rigs: response if the unresolved effects belong to the rig, not to the bushing; None without such effects.
     """
 
     place: Place
@@ -104,7 +104,7 @@ def predict_resonance(
     base = base_acceleration / (2.0 * np.pi * frequency) ** 2
 
     def shaken(model: Model) -> PredictedResonance:
-        """Response of the mass with one model, without warnings."""
+        """Response of the mass predicted with one model, without warnings."""
         stiffness_at = partial(model.stiffness, place, frequency, conditions=conditions)
         amplitude, ratio = shaken_response(stiffness_at, mass, frequency, base)
         stiffness = stiffness_at(amplitude)

@@ -64,7 +64,7 @@ class TimeResponse:
 
     @property
     def power(self) -> float:
-        """Mean power that the motion gives to the bushing [W], or to a unit volume of a specimen [W/m^3]."""
+        """Mean power that the motion transfers to the bushing [W], or to a unit volume of a specimen [W/m^3]."""
         return work(self.history, self.force.value) / (self.history.step * self.history.value.size)
 
     @property
@@ -104,7 +104,7 @@ def time_response(
         place: direction or specimen.
         history: displacement [m, rad or 1], (n,), from `History.sampled`.
         temperature: temperature of the rubber [K]; None for the reference temperature.
-        rig: True to include the effects of the rig, as in the tests; False for the bushing as the car will have it.
+        rig: True to include the effects of the rig, as in the tests; False for the bushing alone, as in a car.
 
     Returns:
         Force with a band that spans all models that agree with the tests. Effects of the rig (unless `rig`) and, in a
@@ -138,9 +138,9 @@ def _force(result: Result, model: Model, place: Place, history: History, conditi
         history: displacement [m, rad or 1], (n,).
         conditions: temperature of the rubber.
 
-    Notes: the model's relative errors of real and imaginary part multiply the force and its Hilbert transform. They are
-    the larger of those at the peak amplitude and at that of a sine of equal rms, at the mean frequency, and of those
-    far from the tested points, because the tests are sines and this motion is none.
+    Notes: the model's relative errors of real and imaginary part multiply the force and its Hilbert transform. The
+    largest of three errors is used: at the mean frequency and the peak amplitude; at the mean frequency and the
+    amplitude of a sine of equal rms; and far from the tested points, because the tests are sines and this motion is not.
     """
     amplitude = np.array([np.abs(history.value).max(), np.sqrt(2.0) * np.std(history.value)])
     amplitude = np.maximum(amplitude, np.finfo(float).eps)
@@ -189,7 +189,7 @@ def _corrected(force: Array, model: Model, place: Place, history: History, condi
 
 
 def _tested(result: Result) -> tuple[float, float] | None:
-    """Largest strain [1] and strain rate [1/s] of the fitted tests; None for a model without tests."""
+    """Largest strain [1] and strain rate [1/s] of the tests to which a result was fitted; None without tests."""
     if result.measured is None:
         return None
     fitted = (place for place in result.fitted_places if result.model.bushing or isinstance(place, Specimen))
@@ -204,7 +204,7 @@ def _tested(result: Result) -> tuple[float, float] | None:
 
 
 def _warnings(result: Result, response: TimeResponse, left_out: list[str], temperature: float | None) -> list[str]:
-    """Sentences on a response: directions and ranges that were not fitted, effects left out, and coarse sampling.
+    """Warnings on a time response: directions and ranges that were not fitted, effects left out, and coarse sampling.
 
     Args:
         result: fitted result.

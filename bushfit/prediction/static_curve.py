@@ -1,4 +1,4 @@
-"""Static curve: force over displacement of a slow cycle at constant rate, from the law in time, with its 95 % band."""
+"""Static curve: force over displacement in a slow cycle at constant rate, from the laws in time, with its 95 % band."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -39,8 +39,8 @@ class StaticCurve:
         secant: static stiffness from end to end, (1,) [N/m, N m/rad or Pa].
         rate: rate of the motion [m/s, rad/s or 1/s].
         warnings: sentences on extrapolation, and on alternatives without a law in time.
-        preload: preload from which displacement and force are counted; None if the tests of this direction did not have
-            several.
+        preload: preload from which displacement and force are counted; None unless this direction was tested at several
+            preloads.
     """
 
     direction: Place
@@ -69,8 +69,8 @@ class StaticCurve:
 def static_rate(result: Result, place: Place, rates: Mapping[str, float] | None = None) -> float:
     """Choose the rate of a static curve.
 
-    The first available of: the rate in `rates`; that of the slowest loop in this direction; that of the slowest loop in
-    any direction, at equal strain rate; 10 mm, 10 deg or 10 % of strain per minute.
+    The first available of: the rate in `rates`; the rate of the slowest loop in this direction; the strain rate of the
+    slowest loop in any direction; 10 mm, 10 deg or 10 % of strain per minute.
 
     Args:
         result: fitted result, whose campaign lists the loops.
@@ -112,7 +112,7 @@ def static_curve(
             preload nearest to zero.
 
     Returns:
-        Curve at even displacements from -reach to reach.
+        Curve at evenly spaced displacements from -reach to reach.
 
     Raises:
         ModelError: an effect of the model has no law in time, or the preload is outside the tested range.
@@ -133,10 +133,10 @@ def _forces(
     """Bands of the static curve of one model, in the steady state of a slow triangular motion.
 
     Args:
-        result: fitted result, which gives the errors.
+        result: fitted result, which contains the errors.
         model: the fitted model or a variant with other effects.
         place: direction or specimen.
-        displacement: even displacements from -reach to reach [m, rad or 1], (n,).
+        displacement: evenly spaced displacements from -reach to reach [m, rad or 1], (n,).
         rate: rate of the motion [m/s, rad/s or 1/s].
         conditions: temperature and preload of the rubber.
 

@@ -1,7 +1,7 @@
-"""Dynamic stiffness with 95 % bands at any frequency and amplitude, of the bushing as the car will have it.
+"""Dynamic stiffness of the bushing alone, without the test rig, with 95 % bands at any frequency and amplitude.
 
-Material and component effects are included, instrument effects are excluded: the car does not have the rig's faults. If
-the tests cannot distinguish an effect of the bushing from one of the rig, the bands span the predictions with and
+Material and component effects are included; instrument effects are excluded, because a car does not contain the rig. If
+the tests cannot decide whether an effect belongs to the bushing or to the rig, the bands span the predictions with and
 without the effect; such effects are called unresolved.
 """
 
@@ -58,7 +58,7 @@ class Prediction:
             None without unresolved effects.
         measured: measured complex stiffness at these points, mean of the repeats, in the unit of |K|, (n,); nan at a
             point without a measurement; None without sweeps.
-        preload: preload of all points; None if the tests of this direction did not have several.
+        preload: preload of all points; None unless this direction was tested at several preloads.
         over: slow large motion or static offset under the harmonic; None for the harmonic alone.
     """
 

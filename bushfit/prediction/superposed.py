@@ -46,12 +46,12 @@ class LargeMotion:
     def history(self, frequency: float, amplitude: float) -> History:
         """Steady motion together with a small harmonic.
 
-        Two cycles of the slow motion hold an odd number of cycles of the harmonic, so that no overtone of the slow
-        motion is at the frequency of the harmonic; the slow frequency is adjusted to this number.
+        The slow frequency is adjusted until two slow cycles contain an odd number of cycles of the harmonic; then no
+        overtone of the slow motion coincides with the harmonic.
 
         Args:
             frequency: frequency of the small harmonic [Hz].
-            amplitude: its zero-to-peak amplitude [m, rad or 1].
+            amplitude: zero-to-peak amplitude of the small harmonic [m, rad or 1].
         """
         cycles = 2 * round(frequency / self.frequency - 0.5) + 1 if self.frequency else 1
         phase = 2.0 * np.pi * np.arange(cycles * _SAMPLES) / _SAMPLES
@@ -106,8 +106,8 @@ def superposed_stiffness_and_slopes(
     Returns:
         Complex stiffness [N/m or N m/rad], (n,), and its derivatives per SI unit of each parameter, (k, n).
 
-    Notes: first harmonic of the force in the steady state, at the frequency of the small harmonic; it is the mean over
-    the cycle of the slow motion. The correction without a name applies as without the slow motion.
+    Notes: the stiffness belongs to the force component at the frequency of the small harmonic in the steady state, a
+    mean over the slow cycle. An unnamed correction is applied as if there were no slow motion.
     """
     named, columns = model.without(UNNAMED), []
     for hertz, size in zip(frequency, amplitude, strict=True):
@@ -125,7 +125,7 @@ def superposed_stiffness_and_slopes(
 def correction_factor(
     model: Model, place: Place, frequency: Array, amplitude: Array, conditions: RubberConditions
 ) -> Array:
-    """Complex factor by which the unnamed correction of a model multiplies its stiffness in a sine, (n,).
+    """Complex factor by which the unnamed correction of a model changes its stiffness in a sine, (n,).
 
     Args:
         model: model with the correction.
@@ -149,15 +149,16 @@ def untimed_effects(model: Model) -> list[str]:
 def timed_candidates(
     result: Result, subject: str, *, rig: bool = False
 ) -> tuple[list[tuple[Result, Model]], list[str]]:
-    """List the model of a result, then the alternatives that fit the tests as well, if they give a force over time.
+    """List the models that agree with the tests and have laws in time: the fitted model, then its alternatives.
 
     Args:
         result: fitted result.
-        subject: beginning of the sentence, such as the direction.
+        subject: beginning of the sentence on alternatives, such as the direction.
         rig: True to include the effects of the rig, as in the tests.
 
     Returns:
-        Models with the result that gives their errors, and a sentence on alternatives that are left out, if any are.
+        Pairs of a model and the result that contains its errors; and a sentence on alternatives that are left out, if
+        any.
 
     Raises:
         ModelError: an effect of the fitted model has no law in time.

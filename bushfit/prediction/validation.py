@@ -1,4 +1,4 @@
-"""Measured and predicted force of validation records, which no fit uses."""
+"""Compare measured and predicted force in validation records, which no fit uses."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -34,12 +34,12 @@ class Validation:
 
     @property
     def peak_gap(self) -> float:
-        """Relative gap of the largest magnitude of the force: measured minus predicted, over measured."""
+        """Relative difference of the largest magnitude of the force: measured minus predicted, over measured."""
         return float(1.0 - self.response.peak / np.abs(self.measured).max())
 
     @property
     def energy_gap(self) -> float:
-        """Relative gap of the work of the motion on the bushing: measured minus predicted, over measured."""
+        """Relative difference of the work of the motion on the bushing: measured minus predicted, over measured."""
         history = self.response.history
         return 1.0 - work(history, self.response.force.value) / work(history, self.measured)
 

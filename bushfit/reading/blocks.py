@@ -1,4 +1,4 @@
-"""Blocks of a table: one below the other, side by side, or with rows and columns exchanged, as one long table."""
+"""Combine the blocks of a table (one below the other, side by side, or transposed) into one long table."""
 
 import re
 from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
@@ -46,11 +46,11 @@ def find_segments(
 
     Args:
         lines: lines or rows of the file.
-        kind: function that returns None for a line that is no row, and equal values for the rows of one run.
-        fewest_rows: smallest number of rows of a run; the rows of a shorter one belong to the lines above the next.
+        kind: function that returns None for a line that is not a row, and equal values for the rows of one run.
+        fewest_rows: smallest number of rows of a run; rows of a shorter run belong to the lines above the next run.
 
     Yields:
-        Each run with the lines above it, and at last the lines below the last run, if there are any.
+        Each run with the lines above it; finally, the lines below the last run, if there are any.
     """
     above = list[Line]()
     for value, run in groupby(lines, key=kind):
@@ -74,7 +74,8 @@ def combined(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> tuple
 
     Returns:
         Source and layout of the table, with an added column "block" and a column for each quantity, such as the
-        amplitude, that all titles or lines above the blocks state; the arguments if there is only one, real, block.
+        amplitude, that all titles or lines above the blocks state. If the file has one block of real numbers, `source`
+        and `layout` are returned unchanged.
     """
     if isinstance(source, Channels) or len(layout.headers) < 2 or layout.headerless:
         return source, layout
@@ -134,7 +135,7 @@ def exchange_rows(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> 
 
 
 def _is_one_block(source: Text, layout: Layout) -> bool:
-    """Return True if the bytes of a text show that no second block follows its header."""
+    """True if the bytes of a text rule out a second block below the header."""
     start, end = source.offset(layout.header_line - 1), source.offset(layout.lines_before_data)
     if len(source.data) > _MOST_BYTES:
         header = source.data[start : source.offset(layout.header_line)].strip()
@@ -143,7 +144,7 @@ def _is_one_block(source: Text, layout: Layout) -> bool:
 
 
 def _find_sides(layout: Layout) -> list[slice]:
-    """Columns of each of several blocks with the same headers and units, behind columns that they share, if any."""
+    """Columns of each of several blocks with equal headers and units; the blocks may share columns on their left."""
     columns = list(zip(layout.headers, layout.units, strict=True))
     first = next((column for column in columns if column[0] and columns.count(column) > 1), None)
     starts = [index for index, column in enumerate(columns) if column == first]
@@ -153,9 +154,9 @@ def _find_sides(layout: Layout) -> list[slice]:
 
 
 def _side_by_side(source: RowSource, layout: Layout, sides: Sequence[slice]) -> list[Segment]:
-    """Separate blocks of columns side by side, each maybe with a title above.
+    """Separate blocks of columns side by side, with or without titles above them.
 
-    Blocks that share columns are separated only if their titles differ; else the list is empty.
+    Blocks that share columns are separated only if their titles differ; otherwise the list is empty.
     """
     head = [line for line in reversed(source.head()) if line.number < layout.header_line]
     rows = [line for line in source.lines(layout.lines_before_data) if not is_comment(line.content, layout.delimiter)]
@@ -224,7 +225,7 @@ def _label_columns(
         labels: labels of each block.
         titles: title of each block, which may name a direction.
         parts: name of the part in each block, used if no quantity distinguishes the blocks.
-        roles: roles for which the blocks have a column already.
+        roles: roles for which the blocks already have a column.
 
     Returns:
         One text or number per block, by header: quantities that all blocks state, direction, part, and block number.

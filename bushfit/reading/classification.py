@@ -164,7 +164,7 @@ def _stated_indices(table: Table, vocabulary: Vocabulary, columns: Mapping[str, 
 
 
 def _column_of(table: Table, heading: Heading, index: int, stated_unit: str | None = None) -> Column:
-    """Make the column of a header, with the unit that the user states, or else that of header and units row.
+    """Make the column of a header, with the unit that the user states, or else the unit in the header or units row.
 
     Args:
         table: header and rows of the table.
@@ -193,7 +193,7 @@ def _column_of(table: Table, heading: Heading, index: int, stated_unit: str | No
 
 
 def _first_numbers(table: Table, columns: Sequence[Column]) -> NDArray[np.float64]:
-    """Numbers in the first rows of columns, (rows, columns), in units of the file; no rows if a cell is no number."""
+    """Numbers in the first rows of columns, (rows, columns), in file units; no rows if a cell is not a number."""
     rows = [[plainest_value(str(row[column.index])) for column in columns] for row in table.first_rows]
     return np.empty((0, len(columns))) if np.isnan(rows).any() else np.array(rows)
 
@@ -294,7 +294,7 @@ def _add_by_unit(table: Table, roles: dict[str, Column]) -> tuple[list[str], lis
 
 
 def _moves_along(table: Table, first: Column, second: Column) -> bool:
-    """Return True if a second column records the motion of a displacement in another size, as an extensometer does."""
+    """True if a second column records the motion of a displacement at another scale, as an extensometer does."""
     if not (first.unit and second.unit and units.is_compatible(second.unit, first.unit)):
         return False
     channels = replace(table, roles={"first": first, "second": second})  # whose cells show the decimal mark

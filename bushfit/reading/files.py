@@ -1,4 +1,4 @@
-"""Files given by the user: their bytes, and their text as UTF-8, or one clear error."""
+"""Read files given by the user, as bytes or as UTF-8 text, with one clear error."""
 
 import codecs
 import hashlib
@@ -207,10 +207,10 @@ def detect(data: bytes) -> str:
         Python's name of the encoding; "utf-8" if the bytes are not text.
 
     Notes:
-        Test files are ASCII but for a few letters of their header, too few for detectors that count letters, such as
+        Test files are ASCII except for a few letters in their header, too few for detectors that count letters, such as
         charset-normalizer and chardet. Here the bytes decide, in this order: a byte order mark; zeros beside ASCII
-        (UTF-16); valid UTF-8; the encoding in which most names of columns are found; pairs of common Chinese
-        characters (GB18030); and Western Latin for the rest (cp1252, or Latin-1 if cp1252 lacks a byte).
+        (UTF-16); valid UTF-8; the encoding in which most names of columns are found; pairs of common Chinese characters
+        (GB18030); and Western Latin for the rest (cp1252, or Latin-1 if cp1252 lacks a byte).
     """
     for mark, encoding in _MARKS:
         if data.startswith(mark):

@@ -104,7 +104,7 @@ def _in_struct(path: str, content: Mapping[str, Any]) -> Iterator[Group]:
 
 
 def tdms(data: bytes, _: Path) -> Iterator[Group]:
-    """Read the channels of a TDMS file; the base of a waveform is time, unless the file states another unit.
+    """Read the channels of a TDMS file; the x axis of a waveform is time, unless the file states another unit.
 
     Yields:
         Each group of the file.
@@ -128,7 +128,7 @@ def tdms(data: bytes, _: Path) -> Iterator[Group]:
 
 
 def mdf(data: bytes, _: Path) -> Iterator[Group]:
-    """Read the channels of an MDF file; the base of each is the master channel of its group, such as time.
+    """Read the channels of an MDF file; the base of each channel is the master channel of its group, such as time.
 
     Yields:
         Each group of the file.

@@ -19,7 +19,7 @@ WORDS: Mapping[str, Mapping[str, Sequence[str]]] = tomllib.loads(
 
 
 def _expand(name: str) -> list[str]:
-    """Names of a column in which a part in braces, such as {base}, is each of its words."""
+    """Expand a column name: a part in braces, such as {base}, is replaced by each of the words it stands for."""
     if (part := re.search(r"{(\w+)}", name)) is None:
         return [name]
     words = {
@@ -222,7 +222,7 @@ class Vocabulary:
         return {heading.role for cell in cells if (heading := self.heading(cell))}
 
     def _read(self, header: str, unit_below: str | None) -> Heading | None:
-        """Find the meaning of a header cell, as `heading` does, but not in the cache."""
+        """Find the meaning of a header cell without the cache of `heading`."""
         text = _TWO_PRIMES.sub(r"\1''", _TAN.sub("tan delta", _CHANNEL.sub("", header))).translate(_SPELLINGS)
         text = _DECIBELS.sub(r" [dB \1]", text)
         logarithm = 0.0
@@ -259,9 +259,9 @@ class Vocabulary:
         return None
 
     def _names_with_symbol(self, name: str, unit: str | None) -> Iterator[str]:
-        """Yield the words of a header without the symbol of its quantity, as in "Storage modulus G'" or "Weg s".
+        """Yield the names in a header that consists of words and a symbol, such as "Storage modulus G'" or "Weg s".
 
-        The symbol of a stiffness decides if the words are not known, as in "Rigidezza elastica K' [N/mm]".
+        If the words are not known, the symbol of a stiffness is a name, as in "Rigidezza elastica K' [N/mm]".
         """
         for blank in re.finditer(r"[\s,(]+", name):
             word, symbol = plain(name[: blank.start()]), plain(name[blank.end() :])
@@ -344,7 +344,7 @@ def split_unit(header: str) -> tuple[str, str | None, AmplitudeConvention | None
 
 
 def _splits(text: str) -> Iterator[tuple[str, str | None, bool]]:
-    """Yield each split of a header, such as "force_N", into name and unit or None, and True with brackets or None."""
+    """Yield each split of a header, such as "force_N": name, unit or None, and True if the unit is in brackets."""
     name, unit = units.split_header(text)
     yield name, unit, True
     if unit is None:

@@ -40,10 +40,10 @@ class Format(NamedTuple):
     Args:
         name: name of the format, such as "TDMS"; "" for a workbook.
         endings: file name endings, such as ".tdms".
-        sign: regular expression that matches the first bytes of a file.
+        sign: regular expression that matches the first bytes of a file in this format.
         read: function that takes bytes and path of a file and yields its groups of channels, or its sheets.
         hint: next step to suggest for a file without channels.
-        again: next step to suggest for a broken file.
+        again: next step to suggest for a damaged file.
     """
 
     name: str
@@ -69,7 +69,7 @@ RECORDINGS = tuple(ending for one in _FORMATS for ending in one.endings)
 
 
 def word_for_part(file: Path) -> str:
-    """Return the word for a part of a file in messages: "group" for a recording, else "sheet"."""
+    """Word for a part of a file in messages: "group" for a recording, "sheet" for a workbook."""
     return "group" if file.suffix.lower() in RECORDINGS else "sheet"
 
 
@@ -157,8 +157,8 @@ def _split_by_length(
 ) -> Iterator[Channels]:
     """Split a group into tables of channels with equal length and the same base channel, such as time.
 
-    The base becomes the first column, unless a channel of the group is named as such. Channels without a base are added
-    to all tables of their length.
+    The base becomes the first column, unless the group has a channel of its name. Channels without a base are added to
+    all tables of their length.
 
     Args:
         name: name of the group.
@@ -193,7 +193,7 @@ def _split_by_length(
 
 
 def _real_channels(channel: Channel, several: bool, is_record: bool) -> Iterator[Channel]:
-    """Convert a channel to real ones: dates to seconds, complex values to magnitude and phase.
+    """Convert a channel to real channels: dates to seconds, complex values to magnitude and phase.
 
     Args:
         channel: channel to convert.

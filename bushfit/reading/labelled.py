@@ -77,7 +77,7 @@ def column_texts(table: Table, *indices: int) -> Iterator[ColumnTexts]:
 def _distinct_cells(
     table: Table, block: RowSource, indices: Sequence[int]
 ) -> Iterator[tuple[NDArray[Any], NDArray[Any]]]:
-    """Find the distinct cells of columns, texts or numbers, in a block of rows.
+    """Find the distinct cells (texts or numbers) of columns in a block of rows.
 
     Yields:
         For each column, the index among its distinct cells of each of the n rows of data, (n,), and these cells.
@@ -179,7 +179,7 @@ def select_rows(table: Table, labels: Mapping[str, tuple[int, Sequence[str]]], w
 def note_not_understood(
     table: Table, labels: Mapping[str, tuple[int, Sequence[str]]], rows: NDArray[np.intp] | None, *settled: Floats
 ) -> Iterator[str]:
-    """Warn of columns that may distinguish several tests in one file, but whose meaning is not known.
+    """Sentences on columns that may distinguish several tests in one file but whose meaning is not known.
 
     Args:
         table: table with all rows.

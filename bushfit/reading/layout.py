@@ -118,12 +118,12 @@ class Layout:
         return self.units_line or self.header_line - self.headerless
 
     def is_repeated(self, cells: Sequence[str]) -> bool:
-        """Return True if a row repeats the header or the row of units, however a blank in a name splits it."""
+        """True if a row repeats the header or the row of units, even if blanks in names split it differently."""
         text = plain("".join(cells))
         return text != "" and any(text == plain("".join(row)) for row in (self.headers, self.units))
 
     def is_header(self, cells: Sequence[str], vocabulary: Vocabulary) -> bool:
-        """Return True if at least two cells of a row name columns of the table, with these or other names and units."""
+        """True if at least two cells of a row name columns of the table, with the same or other names and units."""
         names = {plain(split_unit(header)[0]) for header in self.headers} - {""}
         matching = names & {plain(split_unit(cell)[0]) for cell in cells}
         return max(len(matching), len(vocabulary.roles(cells) & vocabulary.roles(self.headers))) > 1
@@ -156,7 +156,7 @@ def is_comment(content: Content, delimiter: str) -> bool:
 def find_layout(
     lines: Sequence[Line], vocabulary: Vocabulary, delimiter: str | None = None, header_line: int | None = None
 ) -> Layout:
-    """Find the header of a table: the line that names most columns of a test and is followed by rows as long.
+    """Find the header of a table: the line that names most columns of a test and is followed by rows of equal length.
 
     A comment is used as the header only if no other line names two columns. If no line names two columns, the header is
     the line above the first rows of numbers, or else the first line.
@@ -217,7 +217,7 @@ def is_unit_alone(header: str, vocabulary: Vocabulary) -> bool:
 
 
 def header_cells(content: Content, delimiter: str) -> Iterator[list[str]]:
-    """Split a header line into cells in each plausible way.
+    """Split a header line into cells, in all plausible ways.
 
     Yields:
         Cells for one way to split the line, without empty cells at the end.
@@ -243,7 +243,7 @@ def _below(lines: Sequence[Line], header: int, delimiter: str) -> Iterator[Line]
 
 
 def is_row(cells: Sequence[str]) -> bool:
-    """Return True if half of the non-empty cells, and at least two, are numbers, and no "name:" comes first."""
+    """True if half of the non-empty cells, and at least two, are numbers, and the first cell is not a "name:"."""
     filled = [cell for cell in cells[:_MOST_COLUMNS] if cell]
     numbers = sum(map(is_like_number, filled))
     return numbers > 1 and 2 * numbers >= len(filled) and not filled[0].endswith(":")
@@ -303,7 +303,7 @@ def _layout(
 ) -> Layout:
     """Layout of the table below a header, with its units row if there is one, and with columns that have no header.
 
-    Below a header of pandas with two levels, a row with the names of the first columns takes the place of the units.
+    In a file of pandas with a header of two levels, the names of the first columns are in the row of the units.
 
     Args:
         lines: non-empty lines at the start of the file.
@@ -343,7 +343,7 @@ def _layout(
 
 
 def _below_headers(header: str, row: str) -> list[str]:
-    """Split a row of units at wide gaps, as a unit may contain a blank, with "" below a header without a unit."""
+    """Split a row of units at wide gaps (a unit may contain a blank); "" below a header without a unit."""
     spans, cells = ([(*cell.span(), cell[0]) for cell in _CELL.finditer(line.expandtabs())] for line in (header, row))
     by_column = {
         max(range(len(spans)), key=lambda n: min(end, spans[n][1]) - max(start, spans[n][0])): text

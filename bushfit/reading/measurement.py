@@ -1,4 +1,4 @@
-"""Measured tests in SI units: a hysteresis loop, a stepped-sine sweep; and the time of a loop recorded without it."""
+"""Measured tests in SI units: hysteresis loops and stepped-sine sweeps; and times of loops without a time column."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ class Loop:
         force: force [N or N m], or stress [Pa], (n,).
         noise: standard deviation of the force, relative to its half range; None if the campaign does not state it.
         has_recorded_time: True if time was recorded, False if it was rebuilt from the displacement.
-        part: position in a record of several loops; None if the record is one loop.
+        part: position in a record of several loops; None if the record is a single loop.
         softening: stiffness of the first cycle relative to that of the last, minus 1; None if noise and the memory of
             the rubber explain the difference.
         temperature: temperature of the test [K]; None if it is not known.

@@ -124,7 +124,7 @@ class Labels:
     convention: AmplitudeConvention | None = None
 
     def of_dimension(self, unit: str) -> list[StatedQuantity]:
-        """Return the distinct quantities with the dimension of an SI unit; only marked ones if any `is_marked`."""
+        """Return the distinct quantities with the dimension of an SI unit; if any is marked, only marked quantities."""
         fitting = [quantity for quantity in dict.fromkeys(self.quantities) if units.is_compatible(quantity.unit, unit)]
         return [quantity for quantity in fitting if quantity.is_marked] or fitting
 
@@ -206,7 +206,7 @@ def labels_in_text(lines: Iterable[Line]) -> Labels:
 
 
 def _convention_in_line(line: Line) -> AmplitudeConvention | None:
-    """Convention of amplitudes in a line such as "all amplitudes pk-pk"; None in a line on something else."""
+    """Convention of amplitudes in a line such as "all amplitudes pk-pk"; None for any other line."""
     words = set(map(plain, _LETTERS.findall(line.text)))
     if words & _WORDS["force"] or not any(word.startswith(tuple(_WORDS["motion"])) for word in words):
         return None
@@ -215,7 +215,7 @@ def _convention_in_line(line: Line) -> AmplitudeConvention | None:
 
 
 def is_remark(text: str) -> bool:
-    """Return True if a text in a file may change what a test means but has no key of a campaign: "2 in parallel"."""
+    """True if a text may change the meaning of a test but fits no key of a campaign, such as "2 in parallel"."""
     return any(plain(word).startswith(_REMARKS) for word in _LETTERS.findall(text))
 
 
@@ -280,7 +280,7 @@ def named_direction(texts: Iterable[str], *, short: bool = False) -> Direction |
 
 
 def direction_of_file(file: Path, headers: Iterable[str], *, turns: bool, sheet: str | None = None) -> Direction | None:
-    """Return the direction named by a sheet, else by its file, else by the headers; None if there is none.
+    """Direction that a sheet name, or else the file name, or else the headers contain; None if none of them does.
 
     Args:
         file: path of the test file.

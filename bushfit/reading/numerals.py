@@ -74,7 +74,7 @@ class NumeralEvidence(NamedTuple):
     """Notations (decimal mark and thousands separator) in which a table can be read, and the first problematic cell.
 
     Args:
-        ways: notations in which all numbers can be read, the plainest first.
+        ways: notations in which all numbers can be read, the simplest first.
         question: location and text of the first number that contradicts the others, or else has different values in
             these notations; None if there is none.
         is_contrary: True if this number contradicts the others.
@@ -87,12 +87,12 @@ class NumeralEvidence(NamedTuple):
 
 @lru_cache(maxsize=4096)
 def is_like_number(text: str) -> bool:
-    """Return True if a cell is a number in any notation; cached, because each first row is looked at several times."""
+    """True if a cell is a number in any notation; cached, because the first rows are examined several times."""
     return _LIKE_NUMBER.fullmatch(text) is not None and any(way.allows(text) for way in ALL_NUMERALS)
 
 
 def plainest_value(text: str) -> float:
-    """Return the number in a cell in the plainest notation that allows it; NaN if there is none."""
+    """Number in a cell, in the simplest notation in which the cell is a number; NaN if there is none."""
     return next((value for way in ALL_NUMERALS if (value := way.value(text)) is not None), math.nan)
 
 

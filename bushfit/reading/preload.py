@@ -19,7 +19,7 @@ class Preload(NamedTuple):
 
     Args:
         value: displacement [m or rad, or strain], or force [N or N m, or Pa].
-        unit: SI unit, which is that of a displacement or that of a force.
+        unit: SI unit of a displacement or of a force.
     """
 
     value: float
@@ -61,7 +61,7 @@ def parse_preload(text: str | None, place: Place) -> Preload | None:
         place: direction or specimen of the test.
 
     Returns:
-        The preload; None if the text is no displacement or force in this direction.
+        The preload; None if the text is not a displacement or force in this direction.
     """
     words = (text or "").split()
     if words and words[-1].lower() in [*Direction] and words.pop().lower() != str(place):
@@ -75,7 +75,7 @@ def parse_preload(text: str | None, place: Place) -> Preload | None:
 
 
 def distinct_preloads(preloads: Sequence[Preload]) -> list[Preload]:
-    """List the different preloads of the tests of one direction; those within 2 % are one.
+    """List the different preloads of the tests of one direction; preloads within 2 % of each other are equal.
 
     Returns:
         Preloads in ascending order; empty if some are forces and others displacements.

@@ -1,4 +1,4 @@
-"""Rows of a table that are not data: the reason for each, a sentence that lists them, and errors if they are many."""
+"""Rows of a table that are not data: the reason for each, a sentence that lists them, and errors if there are many."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def row_fault(table: Table, cells: Sequence[str | float]) -> str | None:
 
 
 def note_left_out(table: Table, rows: Sequence[FaultyRow], count: int) -> Iterator[str]:
-    """Describe rows that are left out because they are not data, except headers and units that are repeated.
+    """Sentence on rows that are left out because they are not data, except repeated headers and rows of units.
 
     Args:
         rows: the rows that are left out.

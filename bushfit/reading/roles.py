@@ -1,4 +1,4 @@
-"""Roles of columns: their names and SI units by the motion of a test, and pairs that give a complex stiffness."""
+"""Roles of columns: names and SI units for each kind of motion, and pairs that determine a complex stiffness."""
 
 from collections.abc import Mapping, Sequence
 

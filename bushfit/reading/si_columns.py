@@ -1,4 +1,4 @@
-"""Columns of a table with their factors to SI, and the questions that a missing column or unit raises."""
+"""Columns of a table with their factors to SI, and errors for missing columns and units."""
 
 from __future__ import annotations
 
@@ -146,7 +146,7 @@ def refuse_other_motion(table: Table, role: str, headers: Sequence[str] | None =
 
 
 def quantity_above(table: Table, unit: str) -> str | None:
-    """Find a quantity such as "0.2 mm" in the lines above the table, where it follows = or :.
+    """Find a quantity such as "0.2 mm" behind "=" or ":" in the lines above the table.
 
     Returns:
         Number and unit as text; None if no quantity, or several, have the dimension of the SI unit `unit`.

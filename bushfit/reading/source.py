@@ -88,7 +88,7 @@ class Text:
 
         Args:
             layout: location of the table.
-            types: data type of each column to read, as pandas takes it, by index.
+            types: pandas data type of each column to read, by index.
             width: number of columns of the table.
             decimal: decimal mark.
 

@@ -125,7 +125,7 @@ def with_places(tables: Any, specimens: Sequence[Specimen]) -> Any:
 
 
 def _roles(roles: Collection[str], value_name: str) -> BeforeValidator:
-    """Make a validator of a table such as { force = "F1" }, which refuses keys that are no roles of columns.
+    """Make a validator of a table such as { force = "F1" }, which refuses keys that are not roles of columns.
 
     Args:
         roles: roles of columns that are valid keys, such as "force".

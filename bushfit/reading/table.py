@@ -1,4 +1,4 @@
-"""Table of a test: its rows as in the file, the roles of its columns, its numbers in SI, and errors with a place."""
+"""Table of a test: rows as in the file, roles of the columns, numbers in SI, and errors that state a location."""
 
 import csv
 import re
@@ -66,7 +66,7 @@ class Table:
         motion: kind of motion: translation, rotation or strain.
         roles: recognised columns, by role such as "force".
         notes: sentences on columns that were recognised only by their unit.
-        selected: positions of the rows of the test among those of `all_rows`, from 0; None for all.
+        selected: positions of the rows of the test in `all_rows`, from 0; None for all rows.
         needed: indices of columns that must contain a number; a row without one is not a row of data.
         clocks: indices of columns that contain times as texts, such as 20:07:10.
         marks: cells that mark a missing value, such as -9999, by index of their column; all copies of a table share it.
@@ -165,8 +165,8 @@ class Table:
             data or numbers in another notation.
 
         Notes:
-            All columns that begin with a number are parsed as numbers: a summary row such as "Mean" then fails, as it
-            must. Texts in front of these columns are searched for such words.
+            All columns that begin with a number are parsed as numbers, so that a summary row such as "Mean" fails as
+            intended. Texts in front of these columns are searched for such words.
         """
         if self.selected is not None or not indices.isdisjoint((*self.clocks, *self.marks)):
             return None
@@ -285,7 +285,7 @@ class Table:
         return f"no time column: the rows are {self.sampling_rate:.6g} a second, as the lines above the table state"
 
     def agrees(self, role: str, expected: str) -> bool:
-        """True if there is a column for a role such as "force", whose unit has the dimension of the unit `expected`."""
+        """True if a column has a role such as "force", and a unit with the dimension of the unit `expected`."""
         column = self.roles.get(role)
         return column is not None and units.is_compatible(column.unit or "1", expected)
 

@@ -1,4 +1,4 @@
-"""Time of each row: clocks, dates, day numbers of spreadsheets, and rounded stamps."""
+"""Time of each row: clock times, dates, day numbers of spreadsheets, and rounded times."""
 
 import re
 from datetime import datetime, timedelta

@@ -26,7 +26,7 @@ _ROTATIONS = 4
 
 
 def uff(data: bytes, file: Path) -> Iterator[Group]:
-    """Read the functions of a universal file (dataset 58), or if there are none, its data at nodes (dataset 55).
+    """Read the functions of a universal file (dataset 58) or, if it has none, its data at nodes (dataset 55).
 
     Yields:
         A group for each complex function, such as a frequency response, and one for all real functions, such as

@@ -1,4 +1,4 @@
-r"""Wide tables of a sweep, turned into long ones: frequencies down and amplitudes across, or the reverse.
+r"""Convert wide tables of a sweep (frequencies down and amplitudes across, or the reverse) into long tables.
 
 A wide table has one block or more, side by side or one below the other. The first column of a block contains
 frequencies or amplitudes. The header of every other column states an amplitude or frequency, and the quantity, in one
@@ -88,7 +88,7 @@ class _WideColumn(NamedTuple):
 
 
 def unpivot(source: RowSource, layout: Layout, file: Path, vocabulary: Vocabulary) -> tuple[RowSource, Layout] | None:
-    """Turn a wide table into a long one, which has a row for each frequency and amplitude.
+    """Convert a wide table into a long table, with a row for each frequency and amplitude.
 
     Args:
         source: lines or rows of the file.

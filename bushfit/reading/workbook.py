@@ -62,7 +62,7 @@ def _xml_of_sheets(data: bytes) -> list[bytes]:
     """XML of each sheet in an xlsx workbook; an empty list for other formats.
 
     Raises:
-        MeasurementError: sheets are too large, or have a cell too far out: the reader allocates all cells before it.
+        MeasurementError: sheets are too large, or have a very distant cell (the reader allocates all cells up to it).
     """
     if not data.startswith(b"PK"):
         return []

@@ -1,4 +1,4 @@
-"""Robust statistics of long arrays, and their evaluation by chunks on all cores."""
+"""Robust statistics of long arrays, and their evaluation in chunks on all cores."""
 
 import os
 from collections.abc import Callable

@@ -130,7 +130,7 @@ def stretches(changes: NDArray[np.bool_], fewest: int = 1) -> list[slice]:
 
 
 def resumes_in_phase(gap: float, *, step: float = 1.0) -> bool:
-    """Return True if a gap [cycles] is at most three cycles and a multiple of `step`: a sine then resumes in phase."""
+    """True if a sine resumes in phase after a gap [cycles]: at most three cycles, and a multiple of `step`."""
     return gap < _LONGEST_INTERRUPTION and abs(gap - step * round(gap / step)) < _SAME_PHASE
 
 
@@ -150,7 +150,7 @@ def shifted_difference(time: Floats, motion: Floats, shift: float, rows: slice) 
 
 
 def lone_outliers(time: Floats, values: Floats) -> NDArray[np.bool_]:
-    """Find single rows of a channel that are far from their neighbours, as by a fault of the recording.
+    """Find single rows of a channel that are far from their neighbours because of a fault of the recording.
 
     Args:
         time: time of each row [s], (n,).
@@ -240,7 +240,7 @@ def keeps_changing(edges: Floats, parts: list[slice]) -> bool:
 
 
 def _change_point(phase: Floats, level: Floats, jitter: float, spread: float) -> int:
-    """Number of cycles after which a run of m cycles changes its frequency or amplitude most; 0 if the run is steady.
+    """Number of cycles after which the frequency or amplitude of a run of m cycles changes; 0 for a steady run.
 
     Args:
         phase: deviation of the crossings from those of an even sine, in units of `jitter`, (m + 1,).

@@ -52,7 +52,7 @@ def noise_and_highest_frequency(value: NDArray[Any], step: float) -> tuple[float
 def prepare_displacements(
     channels: Sequence[DisplacementHistory], *, steady: bool = False, lowpass: float | None = None
 ) -> list[DisplacementHistory]:
-    """Prepare the channels of a history for a model; notes state what was changed.
+    """Prepare the channels of a displacement history for a model; notes state all changes.
 
     Args:
         channels: evenly sampled displacements at the same times, one per direction.
@@ -78,14 +78,14 @@ def prepare_displacements(
 
 
 def prepare_record(record: Loop, lowpass: float | None = None) -> Loop:
-    """Prepare a validation record for a model: even times, and the displacement as by `prepare_displacements`.
+    """Prepare a validation record for a model: resample it evenly, and treat the displacement as a history.
 
     Args:
         record: record of time, displacement and force, in SI.
         lowpass: cut-off frequency of a low-pass filter for the displacement [Hz]; None for no filter.
 
     Returns:
-        Record with even times; the notes of its source state what was changed.
+        Record at evenly spaced times; the notes of its source state all changes.
     """
     with error_location(record.source.file if record.source else None, "time"):
         time, notes = even_time(record.time)

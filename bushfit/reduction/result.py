@@ -166,7 +166,7 @@ class Reduction:
 
 
 def preload_warnings(steps: Sequence[Step], direction: Place) -> list[str]:
-    """Write a warning on a preload: a mean displacement or force too large to be the zero offset of a sensor.
+    """Warning on a preload: a mean displacement or force that is too large for the zero offset of a sensor.
 
     Args:
         steps: operating points of one direction.

@@ -1,4 +1,4 @@
-"""Operating points from raw stepped-sine histories: the steps are found, and each gives a complex stiffness.
+"""Reduce raw stepped-sine histories to operating points: find the steps, and the complex stiffness in each step.
 
 A history is cut into cycles at the upward crossings of its displacement. Consecutive cycles of equal frequency and
 amplitude form a step, and a step is evaluated by one least-squares fit to all of its steady cycles.
@@ -202,7 +202,7 @@ def _step(history: Loop, cycles: Cycles, inside: slice, motion: Complex, force: 
 
 
 def _creeps(values: Floats, smallest: float) -> bool:
-    """Return True if values have a linear trend, in total larger than `smallest` and than their scatter explains.
+    """True if the total linear trend of values is larger than `smallest` and than their scatter explains.
 
     Args:
         values: log of the period, or of the amplitude, of each cycle in order, (n,).

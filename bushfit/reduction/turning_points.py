@@ -1,4 +1,4 @@
-"""Turning points of a motion, without the turning points of noise and of a ripple on the motion."""
+"""Turning points of a motion, without those caused by noise and by ripple."""
 
 from typing import Any
 
@@ -102,10 +102,10 @@ def motion_turns(time: Floats, motion: Floats) -> tuple[Integers, float]:
         smallest stroke that is not noise [m or rad].
 
     Notes:
-        Strokes below 2 % of the record's range may be a ripple: rigs miss their own amplitude by more. They may also be
-        a test of small amplitude in a record with larger amplitudes or with a preload. A test of small amplitude is
-        separate in time from larger motions, whereas a ripple coincides with one. Therefore each half cycle of the
-        larger motion, from one crossing of its middle to the next, is classified:
+        Strokes below 2 % of the record's range may be a ripple, because rigs miss their set amplitude by more. They may
+        also be a test of small amplitude in a record with larger amplitudes or with a preload. A test of small
+        amplitude is separate in time from larger motions, whereas a ripple coincides with one. Therefore each half
+        cycle of the larger motion, from one crossing of its middle to the next, is classified:
 
         - If the half cycle recurs a cycle later, the larger motion is the test, and small strokes are a ripple.
         - Otherwise small strokes are a ripple unless the motion stays near one value for 30 % of the half cycle. A sine

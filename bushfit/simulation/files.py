@@ -1,4 +1,4 @@
-"""Files of a simulated campaign: test tables like a laboratory's, the campaign file, and the true model."""
+"""Files of a simulated campaign: test tables as a laboratory writes them, the campaign file, and the true model."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def _campaign_toml(simulated: Simulated, form: Form) -> str:
 
 
 def raw_loop_table(loop: Loop) -> pd.DataFrame:
-    """Convert a simulated loop to a test table like a laboratory's, in display units.
+    """Convert a simulated loop to a test table as a laboratory writes it, in display units.
 
     Args:
         loop: simulated loop.
@@ -104,7 +104,7 @@ def raw_loop_table(loop: Loop) -> pd.DataFrame:
 
 
 def raw_sweep_table(sweep: Sweep) -> pd.DataFrame:
-    """Convert a simulated sweep to a test table like a laboratory's, in display units.
+    """Convert a simulated sweep to a test table as a laboratory writes it, in display units.
 
     If the amplitude is stepped, the table has the amplitudes that the rig reached instead of the nominal ones.
 
@@ -133,7 +133,7 @@ def raw_sweep_table(sweep: Sweep) -> pd.DataFrame:
 
 
 def raw_resonance_table(test: ResonanceTest) -> pd.DataFrame:
-    """Convert a simulated resonance test to a test table like a laboratory's.
+    """Convert a simulated resonance test to a test table as a laboratory writes it.
 
     Args:
         test: simulated resonance test.

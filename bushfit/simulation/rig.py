@@ -2,7 +2,7 @@
 
 It steps Eqs. (3) and (5) through time from rest, with the full memory of the springpot and the turning points of the
 friction, and evaluates force and displacement by lock-in. It shares no formula with the closed form of the steady
-state, so each checks the other.
+state, so the two can be checked against each other.
 """
 
 from functools import partial
@@ -53,7 +53,7 @@ def simulate_cycles(
         amplitude: zero-to-peak amplitude [m or rad].
         cycles: number of recorded cycles.
         run_in: number of cycles before the record.
-        steps_per_cycle: time steps per cycle; the error of the Gruenwald-Letnikov sum is inversely proportional.
+        steps_per_cycle: time steps per cycle; the error of the Gruenwald-Letnikov sum is inversely proportional to it.
         waveform: "sine" or "triangle".
         kind: "loop" or "sweep"; only effects of the instrument depend on it.
         conditions: temperature and history of the rubber, one number each.

@@ -57,7 +57,7 @@ _SWELL_CYCLES, _SWELL_TO = 100, 0.3
 
 @dataclass(frozen=True, eq=False)
 class Undisturbed:
-    """Tests of a known model without noise and random errors, to which `measure` adds those of a rig.
+    """Tests of a known model without noise and random errors, which `measure` adds.
 
     Args:
         truth: true model, including effects of the rig.
@@ -126,7 +126,7 @@ def _clean_loop(truth: Model, test: SimulatedLoop, conditions: RubberConditions)
 
 
 def _steady_loop(truth: Model, test: SimulatedLoop) -> tuple[Array, float, int]:
-    """Motion of a loop from rest, with so many cycles before the record that its friction is steady.
+    """Motion of a loop from rest, with enough cycles before the record to make its friction steady.
 
     Args:
         truth: true model.
@@ -136,9 +136,9 @@ def _steady_loop(truth: Model, test: SimulatedLoop) -> tuple[Array, float, int]:
         Displacement [m or rad], time step [s], and number of steps before the record.
 
     Notes:
-        The mean friction stress from the start must decay to a thousandth. One cycle at a strain of a tenth of eps_half
-        leaves 95 % of it, at a hundredth 99.96 %. Where this takes too many cycles, others come first, whose amplitude
-        grows and decays (Hann window).
+        The mean friction stress from the start must decay to a thousandth. One cycle at a strain of eps_half/10 leaves
+        95 % of the mean, one at eps_half/100 leaves 99.96 %. If this takes too many cycles, cycles of growing and
+        decaying amplitude (Hann window) come first.
     """
     ((frequency, amplitude),) = test.parts
     run_in, swell_cycles, swell_factor = _LEAST_RUN_IN, 0, 1.0
