@@ -1,4 +1,4 @@
-"""Errors that a user can correct: a message has a place, the value found, the value expected and the next step."""
+"""Errors that a user can correct: each message states location, value found, value expected and next step."""
 
 from __future__ import annotations
 
@@ -142,10 +142,10 @@ class BatchError(BushfitError):
 def unknown_name(
     problem: str, name: str, names: Collection[str], kind: type[BushfitError] = BushfitError, place: str | None = None
 ) -> BushfitError:
-    """Make the error, to be raised, for a name that is none of the known names; the hint is the most similar one.
+    """Make the error for an unknown name; its hint suggests the most similar known name.
 
     Args:
-        problem: what is wrong.
+        problem: the problem in one clause, without the name.
         name: unknown name.
         names: known names.
         kind: class of the error.
@@ -156,5 +156,5 @@ def unknown_name(
 
 
 def quote_path(path: Path) -> str:
-    """Return a path as it is typed in a terminal: in quotes if it contains characters that a shell would interpret."""
+    """Format a path for a terminal: in quotes if it contains characters that a shell would interpret."""
     return f'"{path}"' if _SHELL_CHARACTERS.search(str(path)) else str(path)

@@ -60,11 +60,11 @@ def with_typical_values(model: Model, name: str, rng: np.random.Generator) -> Mo
 
 
 def check_effect(name: str, *, add: AddEffect | None = None, seed: int = 20240607) -> None:
-    """Check that an effect keeps the contract on which fits, diagnosis and files rely.
+    """Check that an effect fulfils the contract on which fits, diagnosis and files rely.
 
-    The record is complete. At the neutral value the effect vanishes in both faces. The first harmonic of the force over
-    a steady cycle is the stiffness. Arrays of parameter values give the same numbers as one value after the other. A
-    model file gives the model back.
+    The record must be complete. At the neutral value the effect must vanish, in stiffness and in force. The first
+    harmonic of the force over a steady cycle must agree with the stiffness. Arrays of parameter values must give the
+    same numbers as single values. A model must survive writing and reading of its file.
 
     Args:
         name: name of the effect in the library, with installed packages and registered files.
@@ -139,7 +139,7 @@ def _check_harmonic(model: Model, effect: Effect, direction: Direction, frequenc
 
 
 def _check_arrays(model: Model, direction: Direction, amplitude: float, rng: np.random.Generator) -> None:
-    """Check that arrays of parameter values give the same stiffness and force as one value after the other."""
+    """Check that arrays of parameter values give the same stiffness and force as single values."""
     models = [
         model.with_values({name: value * rng.uniform(0.9, 1.1) for name, value in model.values.items()})
         for _ in range(3)

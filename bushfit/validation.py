@@ -91,7 +91,7 @@ def converter(
     """
 
     def run(raw: Any, info: ValidationInfo) -> Any:
-        """Convert a raw value; pydantic takes a ValueError as its own."""
+        """Convert a raw value; a BushfitError becomes a ValueError, which pydantic reports."""
         try:
             return convert(raw, info)
         except BushfitError as error:

@@ -1,4 +1,4 @@
-"""Many campaigns at once: the rows of a manifest through the commands of a single campaign, on cores or on a cluster.
+"""Many campaigns at once: run the commands of a single campaign on each row of a manifest, on cores or a cluster.
 
 manifest (rows) -> executor (workers) -> row (one part) -> store (its folder) -> summary (table, limits, page).
 """

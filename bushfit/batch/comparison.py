@@ -1,4 +1,4 @@
-"""The parts of a batch compared with each other: outlying parts, and capability against limits."""
+"""Compare the parts of a batch with each other: outlying parts, and process capability (Cp, Cpk)."""
 
 import math
 from collections.abc import Mapping
@@ -24,15 +24,15 @@ def find_outliers(quantities: Mapping[str, tuple[Array, Array]]) -> tuple[dict[s
         quantities: values and standard errors of the n parts by name of the quantity, (n,) each; NaN where not known.
 
     Returns:
-        Two mappings by name of the quantity, (n,) each: deviation from the mean of the parts that are outliers in no
-        quantity, in their standard deviations, NaN where not known; and a mask of the outliers.
+        Two mappings by name of the quantity, (n,) each: deviation from the mean of the reference parts (outliers in no
+        quantity), in their standard deviations, NaN where not known; and a mask of the outliers.
 
     Notes:
-        Generalised extreme studentised deviate procedure (Rosner, Technometrics 25 (1983) 165) for up to a quarter
-        of the parts, with Bonferroni's correction for the number of quantities. Each value is held against the others
-        without it, so that their deviation has n - 2 degrees of freedom and the limit is that of `smallest_deviation`.
-        A standard error above the usual one widens the deviation that a value may have. Outliers of one quantity are
-        then compared in all quantities with the parts that are outliers in none, so that they do not hide each other.
+        Generalised extreme studentised deviate procedure (Rosner, Technometrics 25 (1983) 165) for up to a quarter of
+        the parts, with Bonferroni's correction for the number of quantities. Each value is compared with the mean of
+        the other values, so that the deviation has n - 2 degrees of freedom and the limit is `smallest_deviation`. A
+        value with a larger standard error than the others may deviate more. Outliers of one quantity are then compared
+        in all quantities with the reference parts, so that they do not hide each other.
     """
     deviations, outliers = dict[str, Array](), dict[str, Array]()
     for name, (values, errors) in quantities.items():
@@ -66,7 +66,8 @@ def usual_parts(values: Array, name: str, outliers: Mapping[str, Array]) -> Arra
         outliers: masks of outliers by name of the quantity, (n,) each.
 
     Returns:
-        Mask of the reference parts, (n,); if fewer than four remain, of those that are no outliers in this quantity.
+        Mask of the reference parts, (n,); if fewer than four remain, of the parts that are not outliers in this
+        quantity.
     """
     finite = np.isfinite(values)
     usual = finite & ~np.any([*outliers.values()], axis=0)
@@ -74,7 +75,7 @@ def usual_parts(values: Array, name: str, outliers: Mapping[str, Array]) -> Arra
 
 
 def _studentised(values: Array, errors: Array, usual: Array) -> Array:
-    """Deviation of each value from the mean of the other usual values, in their standard deviations, (n,).
+    """Deviation of each value from the mean of the other reference values, in their standard deviations, (n,).
 
     Args:
         values: values of one quantity of the n parts, (n,).

@@ -1,4 +1,4 @@
-"""The JSON file of one part of a batch, `row.json`; that of the whole batch is in `report.batch_document`."""
+"""JSON file of one part of a batch, `row.json`; `report.batch_document` defines the file of the whole batch."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -58,7 +58,7 @@ class Estimate:
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class RowFile:
-    """Results of one part, and the hashes by which a later run recognises that the results are still valid.
+    """Results of one part, with hashes that show a later run whether the results are still valid.
 
     Args:
         schema: name and version of the layout of this file.
@@ -69,7 +69,7 @@ class RowFile:
         inputs: SHA-256 of each input file.
         files: SHA-256 of each result file.
         campaign_name: name of the campaign.
-        verdict: verdict of diagnose; null without it.
+        verdict: verdict of diagnose; null if diagnose was not run.
         effects: effects that diagnose named.
         alternatives: effects that these tests cannot distinguish from the named effects.
         warnings: warnings of the fit and of the predictions.

@@ -1,7 +1,7 @@
 """Workers of a batch: processes of this machine or of a Dask cluster, both behind `concurrent.futures.Executor`.
 
-A process that dies breaks the whole local pool, so the rows that were out are tried again, one at a time; a row that
-fails again and again is given up, and the rest goes on.
+A process that dies breaks the whole local pool. The rows in progress are then tried again, one at a time. A row that
+fails repeatedly is given up, and the others continue.
 """
 
 from __future__ import annotations

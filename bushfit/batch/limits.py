@@ -1,14 +1,14 @@
 """Limits: a TOML file of fixed limits and of limits relative to the batch, and the result of each part.
 
-A part is as good as the worst of its quantities.
+The result of a part is the worst result of its quantities.
 
 Notes:
     A value with its 95 % interval meets a limit in one of four ways, named as in ILAC-G8:09/2019, statements of
-    conformity. Pass: the whole interval is within the limits. Conditional pass: the value is within, the interval is
-    not. Conditional fail: the value is outside, a part of the interval is within. Fail: the whole interval is outside.
-    A quantity that is not known fails. A parameter at a bound of its fit is a conditional pass at best, because the
-    tests do not determine it. Where the model misses the tests, the limits are held against the measured points; a
-    limit without a measured point is not judged.
+    conformity. Pass: the whole interval is within the limits. Conditional pass: the value is within the limits, but not
+    the whole interval. Conditional fail: the value is outside, but a part of the interval is within. Fail: the whole
+    interval is outside. An unknown quantity fails. A parameter at a bound of its fit is a conditional pass at best,
+    because the tests do not determine it. If the model misses the tests, the measured points are compared with the
+    limits; a limit without a measured point is not judged.
 """
 
 import math
@@ -105,7 +105,8 @@ Stiffness = Annotated[float, _STIFFNESS, _LIMIT]
 class PointLimits:
     """Operating point to which limits apply.
 
-    As the last base class of a table it makes pydantic read the point before the limits, whose unit depends on it.
+    As the last base class of a table, this class makes pydantic read the point before the limits, because the unit of
+    the limits depends on the point.
 
     Args:
         at: operating point, such as "axial 25 Hz 0.1 mm".
@@ -245,7 +246,7 @@ def judge_part(
     Args:
         record: results of the part.
         limits: the limits file.
-        allowed: lowest and highest allowed value by the name of the quantity, as the whole batch resolves them.
+        allowed: lowest and highest allowed value by the name of the quantity, from `resolve_limits`.
         quantities: quantities by name, with the units for the sentences.
 
     Returns:

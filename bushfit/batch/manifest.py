@@ -1,4 +1,4 @@
-"""Manifests: a TOML or CSV file, or a pattern, read as rows with a name, a folder and settings each."""
+"""Read a manifest (a TOML or CSV file, or a pattern) as rows, each with a name, a folder and settings."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ Candidates = Annotated[tuple[Annotated[str, converter(partial(_check_name, get_c
 class RowSettings:
     """Settings of one part (a row of the batch), or of a whole manifest; None if not stated.
 
-    A row without a setting takes that of the manifest, or else the default.
+    If a row does not state a setting, the setting of the manifest applies, or else the default.
 
     Args:
         commands: run alone, or any of fit, diagnose, predict and respond; default fit.
@@ -273,9 +273,9 @@ def expand_pattern(entry: Entry, base: Path, source: str) -> list[Entry]:
 def make_rows(entries: Sequence[Entry], base: Path, settings: RowSettings, source: str) -> list[Row]:
     """Make the rows of a batch: give each entry a name, a folder and complete settings.
 
-    The name of a part is the name in the entry, else the stem of its file, or the name of the file's folder if several
-    files have one stem. The folder is the name with characters that are valid on every system, and with a number if
-    another row has the same folder regardless of case.
+    The name of a part is the name in the entry, or else the stem of its file, or the name of the file's folder if
+    several files have the same stem. The folder is the name with characters that are valid on every system, and with a
+    number if another row has the same folder regardless of case.
 
     Args:
         entries: entries of the manifest, without patterns.

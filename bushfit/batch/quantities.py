@@ -1,4 +1,4 @@
-"""Operating points in words, and the quantities of a part that are tabled, judged and drawn."""
+"""Operating points as text, and the quantities of a part for tables, limits and figures."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def parse_point(text: str) -> Point:
     """Parse an operating point such as "axial 25 Hz 0.1 mm".
 
     With several bushings, the name of the bushing comes first: "long axial" is the axial direction of "long". A name
-    that resembles no direction is that of a specimen.
+    that resembles no direction is the name of a specimen.
 
     Returns:
         The point in SI units.
@@ -99,7 +99,7 @@ class PartQuantity:
 
     @property
     def tabled(self) -> PartQuantity:
-        """Copy of the quantity in the unit of its table column; for a parameter, that of a typical value."""
+        """Copy of the quantity in the unit of its table column; for a parameter, the unit of a typical value."""
         return self.displayed(get_parameter(self.name).typical) if is_parameter(self.name) else self
 
     @property
@@ -164,7 +164,7 @@ def measured_at(sweeps: Iterable[Sweep], point: Point, noise: float) -> dict[str
 
 
 def measured_curve(sweeps: Iterable[Sweep]) -> dict[str, float]:
-    """Measured |K| along one run of a sweep, by which the parts of a batch are compared.
+    """Measured |K| along one run of a sweep, for the comparison of the parts of a batch.
 
     The run is that of the middle constant amplitude (or frequency) of the first sweep over frequency (or amplitude).
     Both are rounded to three digits, so that parts have common points although a rig reaches its set points with some

@@ -1,4 +1,4 @@
-"""Run of a whole batch: workers evaluate the rows and save their records; then table, picture and page are written."""
+"""Run a whole batch: workers evaluate the rows and save their records; then table, picture and page are written."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ FILES = [*(f"batch.{ending}" for ending in ("json", "csv", "xlsx", *get_args(Pic
 
 
 def check_output(plan: BatchPlan, *, force: bool) -> None:
-    """Check before the computation that the results can be written and overwrite no earlier results unasked.
+    """Check before the computation that the results can be written and overwrite nothing without `force`.
 
     Args:
         plan: settings of the batch.

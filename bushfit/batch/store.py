@@ -1,4 +1,4 @@
-"""Folder of a row: its result files and `row.json`, whose hashes say whether they still hold.
+"""Folder of a row: its result files and `row.json`, whose hashes show whether the files are still valid.
 
 Notes:
     A folder is written under a temporary name and renamed, so a killed process leaves a complete folder or none. If a
@@ -33,7 +33,7 @@ STAGE = ".aside"
 
 
 def row_key(row: Row, points: Collection[Point], formats: Formats) -> str:
-    """Hash of all that the results of a part depend on beside its input files: settings and version of bushfit.
+    """Hash of everything except the input files that the results of a part depend on: settings and version of bushfit.
 
     Args:
         row: row of the batch (one part) with its settings.

@@ -1,4 +1,4 @@
-"""The results of a batch: the document of `batch.json`, the table and the picture."""
+"""Results of a batch: the document of `batch.json`, the table and the picture."""
 
 from __future__ import annotations
 
@@ -134,8 +134,8 @@ class BatchResult:
     def compared_values(self) -> dict[str, tuple[Array, Array]]:
         """Values and standard errors for the comparison of the parts, by name of the quantity, (n,) each.
 
-        Measures of the fit are left out; parameters at a bound or beside an unnamed correction, which contain a part of
-        the gap, and values of poor fits are NaN.
+        Measures of the fit are left out. Values of poor fits and parameters at a bound are NaN, and so are parameters
+        of a model with an unnamed correction, because the parameters contain a part of the gap.
         """
         compared = dict[str, tuple[Array, Array]]()
         for name in (name for name in self.quantities if name in self.estimates and name not in FIT_NAMES):

@@ -1,1 +1,1 @@
-"""A campaign: one bushing and its tests, as its TOML file names them."""
+"""Campaigns: one bushing and its tests, read from a TOML file."""

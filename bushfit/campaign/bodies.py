@@ -12,7 +12,7 @@ from bushfit.validation import Count, Length, Name, si
 
 
 def _check_name(name: str) -> str:
-    """Return the name of a bushing or specimen.
+    """Check the name of a bushing or specimen, and return it.
 
     Raises:
         ValueError: a direction, or another table in the results folder, has this name.
@@ -69,7 +69,7 @@ class SeveralBushings(BushingSettings):
     """[[bushings]]: one of several bushings of one compound, in place of [bushing].
 
     Args:
-        factor: "free" to fit the measured over the computed stiffness of this bushing; "one" if they are equal.
+        factor: "free" to fit the ratio of measured to computed stiffness of this bushing; "one" to fix the ratio at 1.
     """
 
     name: BodyName
@@ -98,6 +98,6 @@ class SpecimenSettings:
 
 
 def specimens_of(bushings: Iterable[SeveralBushings], coupons: Iterable[SpecimenSettings]) -> list[Specimen]:
-    """Make the specimens of a campaign: three directions for each of several bushings, then those of [[specimens]]."""
+    """Make the specimens of a campaign: three directions of each of several bushings, then [[specimens]]."""
     directions = [place for table in bushings for place in Specimen.of_bushing(table.to_bushing())]
     return [*directions, *(Specimen(**vars(table)) for table in coupons)]

@@ -23,7 +23,7 @@ _PLUS_MINUS = re.compile(rf"\s*{_NUMBER}\s*(|[^\d\s+].*?)\s*(?:\+/?-|±)\s*{_NUM
 
 
 def constraints_of(campaign: Campaign) -> Constraints:
-    """Read what a campaign states about its parameters beside the tests: priors (earlier knowledge), and ties.
+    """Read the constraints that a campaign states for its parameters: priors (earlier knowledge), and ties.
 
     Args:
         campaign: campaign with its [fit].
@@ -32,7 +32,7 @@ def constraints_of(campaign: Campaign) -> Constraints:
         Priors, and ties (expressions of other parameters) in an order in which each can be computed.
 
     Raises:
-        CampaignError: a text that is no prior, ties in a circle, or settings that exclude each other.
+        CampaignError: a text that is not a prior, ties in a circle, or settings that exclude each other.
         ModelError: an earlier model that cannot be used, or an expression without a value.
     """
     settings = campaign.fit.parameters
@@ -95,8 +95,8 @@ def _from_result(
         campaign: campaign whose tests the earlier fit must not have used.
         result: earlier fit.
         file: its model.json, as the campaign states it.
-        only: name of the parameter that is taken; None for all fitted parameters that are free in the campaign.
-        without: names of parameters that are not taken.
+        only: name of the only parameter to use; None for all fitted parameters that are free in the campaign.
+        without: names of parameters to leave out.
     """
     sources = [loop.source for loop in campaign.loops] + [sweep.source for sweep in campaign.sweeps]
     hashes = {source.sha256 for source in sources if source}

@@ -1,4 +1,4 @@
-"""Tests that a campaign lists twice under two names, and repeats that were copied: each counts once, with a note."""
+"""Leave out copies: tests that a campaign lists under two names, and repeats that were copied within a file."""
 
 from collections import defaultdict
 from collections.abc import Sequence
@@ -40,7 +40,7 @@ def group_copies(tests: Sequence[_Test]) -> list[list[_Test]]:
 
 
 def without_copied_tests(tests: Sequence[_Test]) -> list[_Test]:
-    """Leave out tests that are copies of an earlier test. A copy holds no information, so the fit counts it once.
+    """Leave out tests that are copies of an earlier test. A copy contains no further information.
 
     Args:
         tests: loops, or sweeps, of a campaign in its order.
@@ -87,7 +87,7 @@ def without_copied_repeats(sweep: Sweep) -> Sweep:
 
 
 def _fingerprint(sweep: Sweep, rows: NDArray[np.bool_] | slice = slice(None)) -> bytes:
-    """Encode frequency, amplitude and stiffness of rows of a sweep, rounded and sorted; equal data have equal bytes."""
+    """Bytes of frequency, amplitude and stiffness of sweep rows, rounded and sorted; equal data have equal bytes."""
     stiffness = sweep.stiffness[rows]
     numbers = np.stack([sweep.frequency[rows], sweep.amplitude_reached[rows], stiffness.real, stiffness.imag])
     scale = 10.0 ** (_DIGITS - 1 - np.floor(np.log10(np.maximum(np.abs(numbers), 1e-300))))

@@ -1,4 +1,4 @@
-"""The tables of a campaign file, key by key: pydantic checks them, quantities become SI."""
+"""Tables of a campaign file with all their keys; pydantic checks them and converts quantities to SI."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field

@@ -1,4 +1,4 @@
-"""Session of a campaign: order of the points, their temperature, and the strains before them."""
+"""Session of a campaign: order of its points, with their temperatures and earlier strains."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -57,7 +57,7 @@ def measured_session(bushing: Bushing | None, tests: Sequence[Loop | Sweep]) -> 
 def planned_session(bushing: Bushing | None, tests: Sequence[SimulatedTest], repeats: int) -> list[RubberConditions]:
     """Conditions of planned tests: temperature, time in the session, earlier strains of each point, and preload.
 
-    The strains of a resonance test depend on its result and are taken as zero.
+    The strains of a resonance test depend on its result and are assumed to be zero.
 
     Args:
         bushing: the bushing; None if only specimens are tested.

@@ -1,4 +1,4 @@
-"""TOML files: read and checked against a schema; tables of a campaign file as text."""
+"""Read TOML files, and write tables of a campaign file as TOML text."""
 
 import re
 import tomllib

@@ -1,4 +1,4 @@
-"""The command line: a file a command; each parses, calls one function and prints."""
+"""Command line: one file for each command, which parses the options, calls one function and prints the result."""
 
 import contextlib
 import importlib
@@ -161,7 +161,8 @@ def _message(error: BaseException) -> str:
 class _Stream:
     """Wrapper of standard output or standard error that handles closed pipes and full disks.
 
-    If writing fails, a stream that `is_needed` (results) raises an OutputError; the other (messages) drops the text.
+    If writing fails, a stream that `is_needed` (for results) raises an OutputError; a stream for messages drops the
+    text.
     """
 
     def __init__(self, stream: TextIO | None, *, is_needed: bool) -> None:

@@ -131,7 +131,7 @@ def _print_gap(output: Output, document: Mapping[str, Any], changed: bool) -> No
     Args:
         output: where to print.
         document: content of diagnosis.json.
-        changed: True if the model or the record differs after the diagnosis.
+        changed: True if the diagnosis changed the model or the record.
     """
     gap, usable, console = document["gap"], document["usable"], output.console
     held_out = gap["heldout"]

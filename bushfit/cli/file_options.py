@@ -1,4 +1,4 @@
-"""Options of the commands on test files for metadata that the files do not contain, and errors that name them."""
+"""Options for metadata that test files do not contain, and errors that name these options."""
 
 import os
 import re
@@ -105,12 +105,12 @@ def _test_options(kind: str, _: click.Context, values: dict[str, Any]) -> dict[s
 
 
 def _metadata_option(usage: str, words: str | None = None) -> Parameter:
-    """Create the option of a campaign key, which stands with its placeholder in `usage`; `words` is the help text."""
+    """Create the option of a campaign key from its name and placeholder (`usage`) and its help text (`words`)."""
     return option(option_name(usage), words, type=TYPES.get(usage.split()[0]))
 
 
 def require_tests(context: click.Context, _: click.Parameter, value: Any) -> Any:
-    """Callback of an argument of one or more test files: raise a MeasurementError if one is missing or no test file."""
+    """Callback for an argument of test files: raise a MeasurementError if a file is missing or not a test file."""
     from bushfit.reading.files import view_bytes
 
     files: Sequence[Path] = value if isinstance(value, tuple) else [value]

@@ -225,7 +225,7 @@ def inspect_sources(
 def inspect_source(
     source: TestSource, test_options: Mapping[str, Any], *, is_sized: bool, is_asking: bool
 ) -> Inspection:
-    """Read one test of the new campaign, with what its file and the user state on it.
+    """Read one test of the new campaign, with the information that its file and the user state.
 
     Args:
         source: file or sheet of the test.
@@ -268,7 +268,7 @@ def inspect_source(
 
 @dataclass(frozen=True)
 class Questions:
-    """Questions at a terminal for missing options of one command; a previous answer is the default next time.
+    """Questions at a terminal for missing options of one command; each answer becomes the next default.
 
     Args:
         output: output of the command.

@@ -25,13 +25,13 @@ Record = tuple[str, Callable[[click.Context, dict[str, Any]], Any]]
 
 
 class Option(click.Option):
-    """Option with a heading in its command's help, and the argument that collects its value, if it is not its own."""
+    """Option with a heading in its command's help and, if it is part of a record, the argument for the record."""
 
     heading: str | None = None
     record: Record | None = None
 
     def get_help_extra(self, ctx: click.Context) -> Any:
-        """Texts that click appends to the help text of the option: none, since the text states the default."""
+        """Texts that click appends to the help text of the option: none, because the help text states the default."""
         return {}
 
     def type_cast_value(self, ctx: click.Context, value: Any) -> Any:
@@ -46,7 +46,8 @@ def option(usage: str, words: str | None = None, **more: Any) -> Parameter:
     Args:
         usage: names, perhaps the name of the Python argument, and the placeholder of the value in capitals, such as
             "-o --output DIR"; a flag has no placeholder.
-        words: help text, which ends with the default in brackets; None if the option shares that of the next option.
+        words: help text, which ends with the default in brackets; None if the option shares the text of the next
+            option.
         **more: further arguments of click.option; an option with `multiple=True` says that it may be given again.
     """
     if words and more.get("multiple"):
@@ -127,14 +128,14 @@ def command_called(name: str, *examples: str) -> Callable[[Function], click.Comm
 
 
 def add_parameters(function: Function, *parameters: Parameter) -> Function:
-    """Add options and arguments to the function of a command, before its present ones; return the function."""
+    """Add options and arguments to the function of a command, before its existing parameters; return the function."""
     for parameter in reversed(parameters):
         function = parameter(function)
     return function
 
 
 def option_group(heading: str, *parameters: Parameter, record: Record | None = None) -> Parameter:
-    """Group options under a heading of the help, in the given order; a `record` collects their values."""
+    """Group options under a heading of the help, in the given order; a dataclass, `record`, collects their values."""
 
     def decorate(function: Function) -> Function:
         before = len(getattr(function, "__click_params__", ()))

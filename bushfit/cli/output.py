@@ -1,4 +1,4 @@
-"""Output of a command: its messages and tables on the terminal, and its results folder."""
+"""Output of a command: messages and tables on the terminal, and files in the results folder."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`bushfit plan`: which tests next, before the rig is booked."""
+"""`bushfit plan`: choose the next tests before the rig is booked."""
 
 from __future__ import annotations
 

@@ -105,7 +105,7 @@ def _print_range(output: Output, outcome: RunOutput) -> None:
 
 
 def two_step_line(two_step: TwoStep, joint: Result) -> str:
-    """Sentence that compares the paper's two-step procedure with the joint fit, in standard errors of the former.
+    """Sentence that compares the paper's two-step procedure with the joint fit, in standard errors of the procedure.
 
     Args:
         two_step: result of the two-step procedure, with its passes.

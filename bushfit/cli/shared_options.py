@@ -51,7 +51,7 @@ def campaign_options(function: Function) -> Function:
 
 
 def number_up_to(maximum: float, name: str) -> Callable[[str], float]:
-    """Make the parser of an option for a positive number, also in percent, up to a maximum; errors call it `name`."""
+    """Make the parser of an option for a positive number up to a maximum, also in percent; `name` is for errors."""
 
     def parse(text: str) -> float:
         with suppress(ValueError):
@@ -160,7 +160,7 @@ def quantity(
 
 
 class Grid(tuple[float, ...]):
-    """Frequencies or amplitudes of an option in SI, with the `text` that stated them."""
+    """Frequencies or amplitudes of an option in SI, with the `text` that the user typed."""
 
     text: str
 

@@ -65,7 +65,7 @@ class ComparisonOutput:
 
     Args:
         comparisons: comparison of each further result with the reference.
-        advice: sentences on the family to use, and on how well each family predicts held-out data; empty for results.
+        advice: sentences on the family to use and on each family's error on held-out data; empty for other results.
         words: sentences on the differences, one for each result and direction.
         notes: warnings on the families.
         warnings: all warnings without repetition, each with the letters of the results that it concerns.
@@ -135,7 +135,7 @@ def compared_result(
     """Make an entry of a comparison from a model or output, or from a campaign, which is fitted as by `fit`.
 
     Args:
-        source: result, output with a result, campaign, or compared result, which is returned as it is.
+        source: result, output with a result, or campaign; a compared result is returned unchanged.
         name: file or folder that the source was read from.
         sha256: SHA-256 of the model file.
         directions: directions of a campaign whose tests are fitted.
@@ -268,8 +268,8 @@ def _common_places(results: Sequence[Result], names: Sequence[str] | None) -> li
     """Find the directions or specimens to compare: those with the given names, or all that the results have in common.
 
     Returns:
-        For each direction or specimen a list of what it is in every result; only the rubber compound if the results
-        have nothing in common.
+        For each common direction or specimen, a list of its equivalents in all results. If the results have none in
+        common, only the rubber compound.
     """
     if names:
         columns = list[list[Place]]()
@@ -292,7 +292,7 @@ def _common_places(results: Sequence[Result], names: Sequence[str] | None) -> li
 
 
 def _entry_document(label: str, entry: ComparedResult) -> ComparedEntry:
-    """Convert a compared result to its entry in compare.json; the label, a letter, stands for it in tables."""
+    """Convert a compared result to its entry in compare.json; `label` is its letter in tables."""
     result, bushing = entry.result, to_document(Result(entry.result.model))["bushing"]
     return {
         "label": label,
@@ -309,7 +309,7 @@ def _entry_document(label: str, entry: ComparedResult) -> ComparedEntry:
 
 
 def _family_document(label: str, family: FittedFamily, result: Result) -> FamilyEntry:
-    """Make the entry of a model family, by its letter (`label`), in compare.json, with its held-out residual."""
+    """Entry of a model family in compare.json, with its held-out residual; `label` is its letter in tables."""
     evidence, held_out = family.evidence, family.holdout
     return {
         "label": label,

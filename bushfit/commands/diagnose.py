@@ -1,4 +1,4 @@
-"""diagnose: where model and tests disagree, and which effect is missing."""
+"""diagnose: find where model and tests disagree, and which effect is missing."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -136,7 +136,7 @@ def diagnose(
 
 
 def _require_free_parameter(data: PreparedCampaign, model: Model | None, settings: DiagnosisSettings) -> None:
-    """Raise a FitError if no parameter is free and no effect is to be added.
+    """Raise a FitError if no parameter is free and no effect is added.
 
     Args:
         data: campaign, prepared for a fit.
@@ -155,7 +155,7 @@ def _require_free_parameter(data: PreparedCampaign, model: Model | None, setting
 
 
 def _with_plan(diagnosis: Diagnosis, campaign: Campaign) -> Diagnosis:
-    """Add to the next test the command `bushfit plan` that distinguishes the effects that the tests leave open.
+    """Add to the next test a command `bushfit plan` for tests that separate the candidate effects.
 
     Args:
         diagnosis: the diagnosis; one without several candidate effects is returned unchanged.

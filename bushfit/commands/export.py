@@ -1,4 +1,4 @@
-"""export: a fitted model in the files of other programs."""
+"""export: convert a fitted model to the files of other programs."""
 
 import importlib
 from collections.abc import Mapping, Sequence

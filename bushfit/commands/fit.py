@@ -87,7 +87,7 @@ def fit_static(
 
     Args:
         campaign: the campaign, or a campaign prepared by `prepare_tests`.
-        dynamic: result whose springpot (m, alpha) is kept fixed; default that of [fit], else no springpot.
+        dynamic: result whose springpot (m, alpha) is kept fixed; default the values of [fit], or else no springpot.
         loss: "soft_l1" or "linear"; default the campaign's.
     """
     data = prepare_tests(campaign, loss)
@@ -105,8 +105,8 @@ def fit_dynamic(
 
     Args:
         campaign: the campaign, or a campaign prepared by `prepare_tests`.
-        static: result whose mu, sigma_fmax and eps_half are kept fixed; default the values of the campaign, or a fit of
-            its loops.
+        static: result whose mu, sigma_fmax and eps_half are kept fixed; default the values in the campaign, or else a
+            fit of its loops.
         loss: "soft_l1" or "linear"; default the campaign's.
 
     Returns:

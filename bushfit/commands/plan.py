@@ -1,4 +1,4 @@
-"""plan: tests that would reduce the uncertainty most, within what the rig can do."""
+"""plan: choose the tests that would reduce the uncertainty most, within the limits of the rig."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence

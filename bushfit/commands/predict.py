@@ -96,7 +96,7 @@ def predict(
 
     Raises:
         ModelError: a direction, frequency, amplitude, temperature or preload for which the model cannot predict.
-        UnitError: a preload that is no displacement or force of a direction.
+        UnitError: a preload that is neither a displacement nor a force of a direction.
     """
     result, directions = as_result(model), grid.get("directions")
     if isinstance(bushing, str):
@@ -178,7 +178,7 @@ def predict(
 
 
 def _assign_bushing(campaign: Campaign, result: Result) -> tuple[Campaign, list[str]]:
-    """Assign the tests of a campaign to the one of several fitted bushings that has the campaign's geometry.
+    """Assign the tests of a campaign to a fitted bushing with the same geometry, if several bushings were fitted.
 
     Returns:
         The campaign, and a note if it tests another shape than that of a single fitted bushing.

@@ -96,7 +96,7 @@ class PredictionOutput:
 
     @cached_property
     def tests(self) -> tuple[Misfit, ...]:
-        """Misfit of the model with each measured sweep and run: NRMSE, reduced chi-square, mean gap of |K|."""
+        """Misfit between model and each measured sweep and run: NRMSE, reduced chi-square, mean difference of |K|."""
         return misfits(self.result.model, *split_by_fit(self.result, self.measured))
 
     @cached_property

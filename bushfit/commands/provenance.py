@@ -1,4 +1,4 @@
-"""Origin of a result: the campaign, its tests and the command, as result files state them; and files that were read."""
+"""Origin of a result as stated in result files: the campaign, its tests, the command, and the files that were read."""
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -45,7 +45,7 @@ def campaign_document(data: PreparedCampaign, command: str, options: Iterable[st
 
 
 def command_line(command: str, *words: str) -> str:
-    """Command line of bushfit as it is typed in a terminal, with quotes where necessary."""
+    """Command line of bushfit for a terminal, with quotes where necessary."""
     return " ".join(["bushfit", command, *(quote_path(Path(word)) for word in words)])
 
 

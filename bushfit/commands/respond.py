@@ -82,7 +82,7 @@ def respond(
         model: result, or output with a result.
         history: file with time and one or more displacements; or displacements [m, rad or 1] by direction or specimen,
             (n,) each.
-        step: time between samples [s], for displacements that are no file.
+        step: time between samples [s], for displacements that are not read from a file.
         direction: direction, specimen or bushing, if the file does not state it; default all of several bushings.
         columns, units: headers and units of unusual columns by role: time, displacement, axial, radial, torsion.
         file_format: format of the file; default detected.

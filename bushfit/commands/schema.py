@@ -1,4 +1,4 @@
-"""schema: JSON Schemas (draft 2020-12) of the files that bushfit writes, and of the TOML files that it is given.
+"""schema: JSON Schemas (draft 2020-12) of the files that bushfit writes, and of the TOML files that it reads.
 
 Each schema is generated on demand from the type that reads or writes the file. The descriptions of keys come from the
 docstring of this type, so a schema cannot be out of date.
@@ -85,7 +85,7 @@ def _generator(way: str) -> Any:
         """Methods of pydantic for parts of a schema, with the changes for the files of bushfit."""
 
         def field_title_should_be_set(self, _: Any) -> bool:
-            """No key has a title: a title made of the key says nothing that the key does not."""
+            """No key has a title, because a title derived from the key adds no information."""
             return False
 
         def field_is_required(self, field: Any, total: bool) -> bool:

@@ -61,7 +61,7 @@ def simulate_campaign(truth: Model, settings: SimulateSettings, form: Form = "cs
 
 
 def simulated_tests(source: Model | Result | HasResult | Campaign) -> tuple[Model, SimulateSettings]:
-    """Model to simulate, and its tests: those of the campaign's [simulate] table, otherwise those of the paper."""
+    """Model to simulate, and its tests: from the [simulate] table of a campaign, or else the tests of the paper."""
     if isinstance(source, Campaign):
         return model_of(source), source.simulate or SimulateSettings()
     return source if isinstance(source, Model) else as_result(source).model, SimulateSettings()

@@ -1,4 +1,4 @@
-"""Labels of a test outside its columns, in names and in the lines above its table: keys of a campaign, and slips."""
+"""Labels of a test in names and in the lines above its table: values for keys of a campaign, and contradictions."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -59,7 +59,7 @@ def labels_of_file(file: Path, sheet: str, test_options: Mapping[str, Any]) -> L
 def keys_from_labels(
     table: Table, place: Place, test_options: Mapping[str, Any], by_name: Labels, of_book: Labels, *, is_sweep: bool
 ) -> tuple[dict[str, Any], dict[str, str], bool]:
-    """Find values for the campaign keys of a test, such as temperature, in the texts beside its columns (labels).
+    """Find values for the campaign keys of a test, such as temperature, in the texts around its columns (labels).
 
     An option takes precedence, then a column, the names, the lines above the table, and the other sheets.
 
@@ -112,7 +112,7 @@ def keys_from_labels(
 
 
 def _zero_to_peak(amplitude: str, convention: AmplitudeConvention | None) -> str:
-    """Convert the text of an amplitude, such as "0.4 mm", to zero-to-peak; without a convention it is zero-to-peak."""
+    """Convert the text of an amplitude, such as "0.4 mm", to zero-to-peak; without a convention it is unchanged."""
     size, _, unit = amplitude.partition(" ")
     return f"{float(size) * ZERO_TO_PEAK[convention or 'zero-to-peak']:.6g} {unit}"
 
@@ -120,7 +120,7 @@ def _zero_to_peak(amplitude: str, convention: AmplitudeConvention | None) -> str
 def _constant_quantity(
     table: Table, place: Place, key: str, sources: Mapping[str, Labels]
 ) -> tuple[str, StatedQuantity]:
-    """Find the amplitude or frequency that a sweep keeps constant in the texts beside its columns (labels).
+    """Find the constant amplitude or frequency of a sweep in the texts around its columns (labels).
 
     Args:
         table: table of the sweep.

@@ -1,4 +1,4 @@
-"""Sizes that no test of a rubber part has: the unit in a header is then likely to be wrong."""
+"""Implausible frequencies, amplitudes and stiffnesses, which suggest a wrong unit in a header."""
 
 import math
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""Contents of a sweep: its frequencies, amplitudes, repeats and noise, and what is odd about it."""
+"""Contents of a sweep: frequencies, amplitudes, repeats, noise and oddities."""
 
 from collections.abc import Iterator
 

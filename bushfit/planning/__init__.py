@@ -1,1 +1,1 @@
-"""The next tests, chosen for their information before the rig is booked."""
+"""Plan the next tests by their information, before the rig is booked."""

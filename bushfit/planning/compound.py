@@ -1,4 +1,4 @@
-"""Guess of the parameters of a rubber that was not tested, from hardness and filler."""
+"""Estimate of the parameters of a rubber that was not tested, from hardness and filler."""
 
 import numpy as np
 

@@ -46,11 +46,11 @@ class Noise:
         scatter: independent error of each point of a sweep, (gain, phase).
         shared: error that all points of one run have in common, (gain, phase).
         level: error that all repeats of a test have in common, (gain, phase): the accuracy class of the rig, as stated
-            in [rig]. Of a loop, only the gain is used.
+            in [rig]. For a loop, only the gain is used.
         force: error of one recorded row of a loop over half the force range, at 1000 rows per cycle as in `simulate`.
-            The default is chosen: that of most force sensors.
-        rows_as_one: number of correlated rows of a loop with the information of one independent row. The default is
-            chosen: an amplifier that passes sixteen harmonics of the cycle.
+            The default is a choice: the error of most force sensors.
+        rows_as_one: number of correlated rows of a loop with the information of one independent row. The default is a
+            choice: an amplifier that passes sixteen harmonics of the cycle.
     """
 
     scatter: tuple[float, float] = (ASSUMED[0], ASSUMED[0])
@@ -71,11 +71,11 @@ class Knowledge:
         covariance: covariance of the relative changes of the k parameters and of the b bounded ones, (k + b, k + b).
         source: origin of the knowledge, as a phrase.
         noise: measurement errors of the rig.
-        rivals: the same for each rival model, this model first; empty if there is no doubt. Rival models explain the
-            tests so far equally well, each by another effect.
+        rivals: knowledge with each rival model, this model first; empty without rivals. Rival models explain the tests
+            so far equally well, each by another effect.
         probability: probability of this model among its rivals.
         tests: runs of the campaign so far.
-        bounded: names of the b parameters that the fit has at a bound; their changes are in units of typical values.
+        bounded: names of the b parameters that are at a bound in the fit; their changes are in units of typical values.
     """
 
     result: Result

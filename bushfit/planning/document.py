@@ -110,13 +110,13 @@ class PlanFile(TypedDict):
         hours: available time on the rig [h].
         tests: runs of the rig in their order.
         hours_planned: duration of the planned tests [h].
-        hours_standard: duration of the standard programme, repeated as often as fits into that of the plan [h].
+        hours_standard: duration of the standard programme, repeated as often as fits into the duration of the plan [h].
         hours_left: available time that the plan does not use [h].
         enough: reason why hours are left; null if they are used.
         targets: targets by name; empty if none was given.
         parameters: relative standard error of each parameter if the model is right.
         stiffness: root mean square relative standard error of the stiffness, by direction or specimen.
-        loss_factor: root mean square standard error of the loss factor, likewise.
+        loss_factor: root mean square standard error of the loss factor, by direction or specimen.
         visible: smallest detectable amount of each effect.
         rivals: models to separate; null if there are none.
         warnings: warnings on the plan.
@@ -161,7 +161,7 @@ def plan_document(
     covariances = [search.error_covariance(counts) for counts in (0 * planned, planned, standard)]
 
     def compared(error: Callable[[Array], float]) -> ErrorComparison:
-        """Entry with an error by the covariance of the parameters: without tests, planned, standard."""
+        """Entry that compares the error given by a covariance of the parameters: before, planned and standard tests."""
         before, with_plan, with_standard = map(error, covariances)
         return {"before": before, "planned": with_plan, "standard": with_standard}
 
@@ -233,7 +233,7 @@ def planned_run(test: Test, minutes: float) -> PlannedRun:
 
 
 def detectable_amounts(search: PlanSearch, counts: Array) -> dict[str, float | None]:
-    """Compute the smallest amount of each effect that runs detect in 90 % of the cases by a test at the 5 % level.
+    """Compute the smallest amount of each effect that given runs detect in 90 % of the cases, at a significance of 5 %.
 
     Args:
         search: search with the candidate tests.

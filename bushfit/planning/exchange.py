@@ -1,4 +1,4 @@
-"""Durations of tests, exchange of tests for the best choice within the hours, and order of the runs."""
+"""Choose the best tests within the available hours by exchanging tests, and order the runs."""
 
 from __future__ import annotations
 

@@ -252,7 +252,7 @@ class CandidateGrid:
 
 
 def relative_slopes(knowledge: Knowledge, data_sets: Sequence[MeasuredTest]) -> Array:
-    """Differentiate the whitened residuals of tests by the relative change of each parameter.
+    """Derivatives of the whitened residuals of tests with respect to the relative change of each parameter.
 
     Args:
         knowledge: model, and the names of its k free parameters and its b parameters at a bound.
@@ -269,9 +269,10 @@ def relative_slopes(knowledge: Knowledge, data_sets: Sequence[MeasuredTest]) -> 
 
 
 def rival_chi_squares(rivals: Sequence[Information]) -> Array:
-    """Compute the expected chi-square by which planned tests tell any two rival models apart.
+    """Compute the expected chi-square by which planned tests separate any two rival models.
 
-    It is the misfit of one rival, with its parameters refitted, to tests of the other: the smaller of both directions.
+    Chi-square is the misfit of one rival, with its parameters refitted, to tests of the other rival; the smaller of the
+    two values is used.
 
     Args:
         rivals: information on each rival, with the other rivals in order as its departures from the model.

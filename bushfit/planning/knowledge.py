@@ -163,8 +163,8 @@ def _add_effects(plain: Evidence, names: Sequence[str], fixed: Sequence[str], bo
         bounds: limits of parameters [SI], inside their default limits.
 
     Returns:
-        Fit with each effect by its name, and with the effect that it needs beside it (as second_maxwell needs maxwell);
-        effects without influence on these tests are omitted.
+        Fit with each effect, by its name, and with any effect that it requires (second_maxwell requires maxwell).
+        Effects without influence on these tests are omitted.
     """
     models = {proposal.name: proposal.model for proposal in proposals(plain, (), fixed) if proposal.name in names}
     fits = refitted(plain, models, {}, fixed, bounds)
@@ -221,7 +221,7 @@ def estimate_noise(data: PreparedCampaign) -> Noise:
 
 
 def with_rig_class(rig: RigSettings, noise: Noise) -> RigSettings:
-    """Settings [rig] with the accuracy class (gain and phase errors) that a plan assumes."""
+    """Copy of the settings [rig] with the accuracy class (gain and phase errors) that a plan assumes."""
     return replace(rig, gain_error=noise.level[0], phase_error=noise.level[1], displacement_error=None)
 
 

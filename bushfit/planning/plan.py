@@ -1,4 +1,4 @@
-"""The plan: tests chosen for an aim, in their order, with explanations and warnings."""
+"""Plan: tests chosen for an aim, in their order, with explanations and warnings."""
 
 from bisect import bisect_left
 from collections.abc import Iterator, Mapping, Sequence

@@ -164,7 +164,7 @@ class PlanSearch:
     def minimum_noncentrality(self) -> Array:
         """Noncentrality (expected chi-square) that the standard programme reaches for each effect, (e,).
 
-        It is that of a typical amount, and 0 if the programme cannot detect even the largest possible amount.
+        It belongs to a typical amount of the effect; 0 if the programme cannot detect even the largest possible amount.
         """
         reached = self.models[0].total(self.count_runs(self.standard_runs)).noncentralities()[0]
         amounts = [effect.amount for effect in self.effects]

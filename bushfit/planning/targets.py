@@ -31,7 +31,8 @@ class PlannedQuantity:
 
     Args:
         name: "mu", "stiffness.axial" or "loss_factor.axial".
-        value: value at each point that makes relative errors absolute: the loss factor; 1 for other quantities, (n,).
+        value: factor that converts relative to reported errors at each point: the loss factor, or 1 for other
+            quantities, (n,).
         rows: derivatives of ln|K|, of the phase [rad] for a loss factor, or of the logarithm of a parameter, with
             respect to the relative change of each parameter, (n, k).
         scale: relative change of the quantity per change of the phase: (1 + loss^2)/loss for a loss factor; 1 for other
@@ -53,7 +54,7 @@ class PlannedQuantity:
 
     @classmethod
     def parameters(cls, knowledge: Knowledge) -> list[PlannedQuantity]:
-        """Each parameter that the tests shall determine, as a quantity without an error that no test lowers."""
+        """Parameters that the tests have to determine, as planned quantities without a model error."""
         rows, one, none = np.eye(len(knowledge.names) + len(knowledge.bounded)), np.ones(1), np.zeros(1)
         pairs = zip(knowledge.names, rows, strict=False)
         return [cls(name, one, row[None], one, none, none) for name, row in pairs]
@@ -112,7 +113,7 @@ class PlannedQuantity:
         return self.half_width(error_covariance) <= self.target * (1.0 + 1e-9)
 
     def reached(self, error_covariance: Array, limit: Array) -> bool:
-        """True if tests meet the target, or miss it by nearly as little as unlimited tests would.
+        """True if tests meet the target, or come nearly as close to it as unlimited tests would.
 
         Args:
             error_covariance: covariance of the parameters with the tests, (k, k).
@@ -129,8 +130,8 @@ class PlannedQuantity:
 
         Returns:
             Matrix W, (k, k): trace(W covariance) is the variance of the quantity over the variance that the target
-            allows, averaged over points. If unlimited tests miss the target, the allowed variance is slightly above
-            theirs.
+            allows, averaged over points. If unlimited tests miss the target, the allowed variance is slightly above the
+            variance with unlimited tests.
         """
         if self.met(limit):
             allowed = np.square(np.maximum(self.target - self.undecided, 0.0) / Z95) - self.model_error**2

@@ -140,7 +140,7 @@ def _force(result: Result, model: Model, place: Place, history: History, conditi
 
     Notes: the model's relative errors of real and imaginary part multiply the force and its Hilbert transform. The
     largest of three errors is used: at the mean frequency and the peak amplitude; at the mean frequency and the
-    amplitude of a sine of equal rms; and far from the tested points, because the tests are sines and this motion is not.
+    amplitude of a sine of equal rms; and far from the tested points, because the tests are sines but not this motion.
     """
     amplitude = np.array([np.abs(history.value).max(), np.sqrt(2.0) * np.std(history.value)])
     amplitude = np.maximum(amplitude, np.finfo(float).eps)
