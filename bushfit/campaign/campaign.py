@@ -167,7 +167,7 @@ def load_bushing(path: Path) -> Bushing:
 
 
 def _check_bodies(content: CampaignFile) -> None:
-    """Raise a CampaignError for missing bodies, [bushing] and [[bushings]], repeated names, or bushings without tests."""
+    """Raise a CampaignError for missing or repeated bodies, [bushing] and [[bushings]], or bushings without tests."""
     names = [*(table.name for table in content.bushings), *(table.name for table in content.specimens)]
     if not (content.bushing or names):
         expected = "[bushing] with its name, radii and length, [[bushings]] or [[specimens]]"
