@@ -1,4 +1,4 @@
-"""Amplitude roll-off: the rig does not reach the amplitude it was asked for at high frequency."""
+"""Amplitude roll-off: the rig does not reach the requested amplitude at high frequency."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Bump stop: a spring that is met beyond a gap, both ways."""
+"""Bump stop: springs that the bushing touches beyond a gap, in both senses of motion."""
 
 from bushfit.effects.contract import Array, ForceBelow, History, Setting, StiffnessBelow, Values
 from bushfit.effects.dead_zone import dead_zone, first_harmonic

@@ -1,4 +1,4 @@
-"""Clearance: play between the bushing and what moves it."""
+"""Clearance: play between the bushing and its drive."""
 
 import numpy as np
 

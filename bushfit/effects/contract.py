@@ -1,4 +1,4 @@
-"""The record that describes one effect, in one of three kinds: branch, modifier or layer.
+"""Records that describe an effect, of one of three kinds: branch, modifier or layer.
 
 The measured response is built from the rubber outward. Inside are *branches* in parallel, each adding a stress.
 Around them lie *layers*: each takes the response below it and returns the response above it. A *modifier* changes
@@ -179,7 +179,7 @@ class Effect:
     """Properties that all effects have.
 
     Args:
-        name: name in files, reports and options; also that of the Python file with the equations.
+        name: name in files, reports and options, and name of the Python file with the equations.
         sentence: description for an engineer.
         equation: equation of the first harmonic, ASCII.
         level: level at which it acts.
@@ -195,8 +195,8 @@ class Effect:
         replaces: name of the paper's branch that the effect replaces; None if the effect is added.
         depends_on: names of the `RubberConditions` on which the effect depends.
         assumption: sentence on the value of these quantities in a prediction; empty for effects of the rig.
-        in_place_of: function from the values of the replaced branch to start values for a fit, the most probable
-            first; None if the effect replaces no branch.
+        in_place_of: function that converts the values of the replaced branch to start values for a fit, the most
+            probable first; None if the effect replaces no branch.
         harmonic_only: True if the effect has no equation in time: in loops it contributes to the first harmonic alone
             (see `harmonic_stress`), and the virtual rig refuses it.
         after: effect that must be in the model before this effect is searched.
@@ -373,7 +373,7 @@ def scaled_response(
 
 
 def linear_stress(modulus: Callable[[Values, Array, Array], Array], p: Values, history: History) -> Array:
-    """Steady stress [Pa] of a linear branch over one cycle: harmonic h of the stress is 2 mu(h omega) times that of e.
+    """Steady stress [Pa] of a linear branch over one cycle: harmonic h is 2 mu(h omega) times harmonic h of the strain.
 
     Args:
         modulus: complex modulus mu of the branch [Pa] for parameter values, angular frequencies [rad/s] and strain

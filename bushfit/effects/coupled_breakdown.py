@@ -1,4 +1,4 @@
-"""Coupled breakdown: the rate effect shrinks as the filler structure breaks down with amplitude."""
+"""Coupled breakdown: the effect of rate decreases as the filler structure breaks down with amplitude."""
 
 import numpy as np
 

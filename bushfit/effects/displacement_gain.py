@@ -1,6 +1,6 @@
-"""Displacement gain: the transducer of one direction, or of one specimen's rig, reads another gain than the others'.
+"""Displacement gain: the displacement transducer of one direction or specimen has another gain than the others.
 
-One transducer for all tests would be no effect that tests can show: mu, m and eps_half absorb it exactly.
+A wrong gain that all tests share cannot be detected, because mu, m and eps_half absorb it exactly.
 """
 
 from bushfit.effects import strain_scale

@@ -1,7 +1,7 @@
-"""Drift: the gain of the force chain moves over the session, evenly or with the logarithm of time.
+"""Drift: the gain of the force chain drifts over the session, evenly or with the logarithm of time.
 
-What warms up or wears drifts evenly. What settles under a preload, a clamp, an adhesive or the bushing itself, does so
-with the logarithm of time.
+Warming up and wear cause an even drift. Settling under a preload (of a clamp, an adhesive or the bushing itself)
+follows the logarithm of time.
 """
 
 from functools import partial

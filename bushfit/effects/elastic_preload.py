@@ -1,4 +1,4 @@
-"""Elastic preload: a preload at one place, which other tests do not have, stiffens what is elastic, and no loss."""
+"""Elastic preload: a preload of one direction or specimen increases the elastic stiffness there, but not the loss."""
 
 from bushfit.effects.contract import Condition, Value, Values, scaled_values
 

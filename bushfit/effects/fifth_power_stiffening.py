@@ -1,4 +1,4 @@
-"""Fifth-power stiffening: the elastic stress turns up late and steeply at large strain."""
+"""Fifth-power stiffening: the elastic stress rises late and steeply at large strain."""
 
 import numpy as np
 

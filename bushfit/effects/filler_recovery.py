@@ -1,4 +1,4 @@
-"""Filler recovery: after a larger amplitude the filler network is still broken, and builds up again with time."""
+"""Filler recovery: after a larger amplitude the filler network is broken, and recovers with time."""
 
 import numpy as np
 

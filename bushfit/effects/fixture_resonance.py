@@ -1,4 +1,4 @@
-"""Fixture resonance: the moving mass sits on a fixture that has a mode of its own."""
+"""Fixture resonance: the moving mass is on a fixture that has a resonance."""
 
 from functools import partial
 

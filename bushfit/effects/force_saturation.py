@@ -1,6 +1,6 @@
-"""Force saturation: the force channel of the sweeps gives less than it should beyond a level.
+"""Force saturation: the force channel of the sweeps reads too little above a force level.
 
-Slow loops have a range of their own, and are cut flat for all to see where that is too small.
+Slow loops are recorded with another range, and a loop that exceeds this range is visibly clipped.
 """
 
 import numpy as np

@@ -1,11 +1,12 @@
-"""Friction branch: friction between filler particles, independent of rate, counted from the last turning point.
+"""Friction branch: friction between filler particles, independent of rate, as a function of strain since the last turn.
 
 Source: Garcia Tarrago et al. 2007, Eq. 5; M. Berg, Vehicle System Dynamics 30 (1998) 197-212.
 
 Notes:
     With u = s_f / sigma_fmax, sgn = sign(de/dt) and d = |e - e_s| / eps_half counted from the last turning point (e_s,
-    u_s), Eq. (5) reads u = u_s + sgn d v / (v + d), v = 1 - sgn u_s. Only d holds eps_half, and sigma_fmax is a factor.
-    So u is computed from one turning point to the next, with its derivative with respect to eps_half in closed form.
+    u_s), Eq. (5) reads u = u_s + sgn d v / (v + d), v = 1 - sgn u_s. Only d depends on eps_half, and sigma_fmax is a
+    factor. So u is computed from one turning point to the next, with its derivative with respect to eps_half in closed
+    form.
 """
 
 from collections.abc import Sequence
@@ -114,7 +115,7 @@ def _roots(x: Array) -> tuple[Array, Array, Array, Array, Array]:
 
 
 def mean_stress_decay(x: Array) -> Array:
-    """Decay per cycle of a mean friction stress that the motion began with: ln(stress before/stress after).
+    """Decay per cycle of the mean friction stress from the start of a motion: ln(stress before/stress after).
 
     Args:
         x: strain amplitude over eps_half, e0/eps_half, any shape.

@@ -1,6 +1,7 @@
 """High-pass: the charge amplifier of a piezoelectric load cell lets a slow force leak away.
 
-Such a cell serves the sweeps; the loops, as slow as the leak, go by one that holds its force.
+Sweeps are measured with such a cell. Loops, which are as slow as the leak, are measured with a cell that keeps its
+signal.
 """
 
 from functools import partial

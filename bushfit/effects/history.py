@@ -74,7 +74,7 @@ class History:
 
         Notes:
             The mean frequency is the rms rate over the rms displacement from the mean, over 2 pi (S. O. Rice, Bell
-            Syst. Tech. J. 24 (1945) 46), that of a sine for a sine; but at least one cycle in the history.
+            Syst. Tech. J. 24 (1945) 46), which is exact for a sine; but at least one cycle in the history.
 
         >>> round(History.sampled(np.sin(np.linspace(0.0, 20.0 * np.pi, 1000)), 1e-3).frequency, 2)
         10.01

@@ -1,4 +1,4 @@
-"""Hysteretic loss: a loss that is the same at every rate and every amplitude."""
+"""Hysteretic loss: a loss that is independent of rate and amplitude."""
 
 from functools import partial
 

@@ -1,4 +1,4 @@
-"""Interface slip: dry friction at the bonded or pressed face of the bushing, over its play too if there is any."""
+"""Interface slip: dry friction at the bonded or pressed face of the bushing, and over the play if the model has one."""
 
 import numpy as np
 

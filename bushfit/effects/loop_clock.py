@@ -1,4 +1,4 @@
-"""Loop clock: the time of the loops runs at another rate than that of the sweeps."""
+"""Loop clock: the time of the loops runs at another rate than the time of the sweeps."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Mistakes in the record: a file or campaign does not state what was measured. See mistakes.toml.
+"""Mistakes in the record: a file or campaign states something else than was measured. See mistakes.toml.
 
 A mistake is an effect of the level `record` without parameters. `diagnose` proposes it; a test is corrected only if the
 user adopts the mistake.
@@ -38,7 +38,7 @@ SEPARATOR = ":"
 class Mistake(Effect):
     """A mistake in the record of a test or of the bushing, such as a wrong unit.
 
-    `sentence` states the mistake, with a slot for the files: "the amplitudes of {files} are peak-to-peak".
+    `sentence` states the mistake, with a placeholder for the files: "the amplitudes of {files} are peak-to-peak".
 
     Args:
         line: line for the campaign file that corrects the mistake, or the correction of the data file.
@@ -51,7 +51,8 @@ class Mistake(Effect):
             that the three ratios cannot describe; None otherwise.
         doubt: function that returns True if the stated complex stiffness, (n,), permits the mistake; None for always.
         swaps: True if axial and radial are interchanged.
-        scales: True for a factor of a power of 1000, possible only if the test as stated is implausible for rubber.
+        scales: True for a factor that is a power of 1000, which is possible only if the test as stated is implausible
+            for rubber.
     """
 
     level: Level = Level.RECORD
@@ -122,7 +123,7 @@ class Mistake(Effect):
             strain: largest strain amplitude as stated [-].
 
         Returns:
-            True if the recording becomes plausible, and for all mistakes other than a factor of a power of 1000.
+            True if the recording becomes plausible; always True for mistakes that are not a factor of a power of 1000.
         """
         if not self.scales:
             return True
@@ -130,7 +131,7 @@ class Mistake(Effect):
         return not _is_of_rubber(modulus, strain) and _is_of_rubber(factor * modulus, self.displacement * strain)
 
     def _direction(self, place: Place) -> Place:
-        """True direction of a test that states `place`: the other of axial and radial if the mistake swaps them."""
+        """True direction of a test that states `place`: the other one if the mistake swaps axial and radial."""
         return _EXCHANGED.get(place, place) if self.swaps else place
 
     def corrected_bushing(self, bushing: Bushing) -> Bushing:

@@ -1,4 +1,4 @@
-"""Mullins over the levels: once strained further, rubber is softer at every smaller strain."""
+"""Mullins effect over the levels: after a larger strain, rubber is softer at every smaller strain."""
 
 import numpy as np
 from scipy.special import erf
@@ -7,7 +7,7 @@ from bushfit.effects.contract import Condition, Value, Values, scaled_values
 
 
 def adjust(p: Values, condition: Condition) -> dict[str, Value]:
-    """Reduce all moduli and stresses of rubber that was strained further before (Mullins effect).
+    """Reduce all moduli and stresses of rubber that was strained further in earlier tests (Mullins effect).
 
     Args:
         p: parameter values by name: all moduli and stresses [Pa]; and share [1]. After a much larger amplitude,

@@ -1,4 +1,4 @@
-"""One-sided stop: a spring that is met beyond a gap, one way only."""
+"""One-sided stop: a spring that the bushing touches beyond a gap, in one sense of motion only."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Preload: rubber about a static deformation has another slope of its elastic law, another friction and springpot."""
+"""Preload: a static deformation changes the slope of the elastic law, the friction and the springpot."""
 
 import numpy as np
 
@@ -48,7 +48,7 @@ def adjust(p: Values, condition: Condition) -> dict[str, Value]:
 
 
 def stress(p: Values, history: History, setting: Setting) -> Array:
-    """Stress by the curvature of the elastic law about a preload, in addition to the straight line by `adjust`.
+    """Stress due to the curvature of the elastic law about a preload, in addition to the linear part of `adjust`.
 
     Args:
         p: parameter values by name: static shear modulus mu [Pa], coefficients c2, c3 [1] of the elastic law.

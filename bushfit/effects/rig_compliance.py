@@ -1,4 +1,4 @@
-"""Rig compliance: the rig gives way in series with the bushing, which is moved less than the rig imposes."""
+"""Rig compliance: the rig is elastic in series with the bushing, which therefore moves less than the rig imposes."""
 
 import numpy as np
 from scipy.fft import next_fast_len
@@ -151,7 +151,7 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
 
 
 def _differences_resolved(estimate: Array, residual: Array) -> bool:
-    """Return True if an iteration for the forces of several models is accurate enough for the models' differences.
+    """True if an iteration for the forces of several models is accurate enough for the differences between the models.
 
     The differences, from which a fit computes derivatives, must be accurate to a thousandth or to rounding.
 
@@ -167,7 +167,7 @@ def _differences_resolved(estimate: Array, residual: Array) -> bool:
 
 
 class _AndersonMixing:
-    """Anderson mixing (D. G. Anderson, J. ACM 12 (1965) 547), by which the solution for the force needs few iterations.
+    """Anderson mixing (D. G. Anderson, J. ACM 12 (1965) 547), which reduces the iterations for the force.
 
     Keeps the last three differences between iterations of the force and of its proposed change.
     """
@@ -198,8 +198,8 @@ def _pulse_stiffness(below: ForceBelow, history: History, length: int) -> Array:
     """Complex stiffness [N/m] at each harmonic of a record: force over displacement of a single pulse.
 
     The pulse, some samples after the start, has the amplitude of the motion, but at least 1 nm. The force is relative
-    to the initial force and, after the pulse, to the last force: friction remains loaded after a pulse, which would
-    pass for a stiffness at low frequencies. The real part of the result is never negative.
+    to the initial force before the pulse, and to the last force after it: friction keeps a force after the pulse, which
+    would otherwise appear as a stiffness at low frequencies. The real part of the result is never negative.
 
     Args:
         below: force without the compliance, as a function of the displacement history.

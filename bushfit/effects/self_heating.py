@@ -1,4 +1,4 @@
-"""Self-heating: what the bushing dissipates warms it, and warm rubber is softer."""
+"""Self-heating: the dissipated power warms the bushing, and warm rubber is softer."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ from bushfit.effects.contract import Condition, Value, Values, scaled_values
 
 
 def adjust(p: Values, condition: Condition) -> dict[str, Value]:
-    """Reduce all moduli and stresses, because the bushing warms up by the power that it dissipates.
+    """Reduce all moduli and stresses, because the dissipated power warms the bushing.
 
     Args:
         p: parameter values by name: all moduli and stresses [Pa], and softening beta [1/W] per watt.

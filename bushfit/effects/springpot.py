@@ -1,4 +1,4 @@
-"""Springpot branch: a fractional derivative, stiffness and loss that grow slowly with frequency."""
+"""Springpot branch: a fractional derivative, whose stiffness and loss grow slowly with frequency."""
 
 from functools import lru_cache
 

@@ -1,4 +1,4 @@
-"""Strain scale: one direction of the bushing, or one specimen, is strained more or less than its formula says."""
+"""Strain scale: the strain of one direction of the bushing, or of one specimen, differs from its formula."""
 
 from bushfit.effects.contract import Array, ForceBelow, History, Setting, StiffnessBelow, Values
 

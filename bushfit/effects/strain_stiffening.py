@@ -1,4 +1,4 @@
-"""Strain stiffening: the elastic stress turns up at large strain."""
+"""Strain stiffening: the elastic stress rises more than linearly at large strain."""
 
 import numpy as np
 

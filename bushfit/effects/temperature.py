@@ -1,4 +1,4 @@
-"""Temperature: warm rubber is softer, and answers as cold rubber does to slower motion."""
+"""Temperature: warm rubber is softer, and responds as cold rubber responds to a slower motion."""
 
 import numpy as np
 

@@ -1,1 +1,1 @@
-"""A fitted model in the files of other programs: solvers, multibody codes, spreadsheets. A file a format."""
+"""Export a fitted model to other programs: solvers, multibody codes, spreadsheets. One module per format."""

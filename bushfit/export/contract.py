@@ -114,7 +114,7 @@ class ExportRequest:
         dialect: solver of the format `nastran`.
         decimal_comma: True for semicolons and decimal commas in the format `csv`.
         temperature: temperature of the rubber [K]; None for the reference temperature of the model.
-        static_rates: rates of static curves by SI unit of displacement; None for those of the slowest loop.
+        static_rates: rates of static curves by SI unit of displacement; None for the rates of the slowest loop.
         time_domain: True for materials in the time domain in the format `abaqus`.
         cardanic: complex stiffness of the rotations about x and y in decks [N m/rad]; None to leave them free.
         day: date to write into decks; None for no date.

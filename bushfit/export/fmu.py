@@ -1,7 +1,7 @@
 """FMU: FMI 2.0 for co-simulation, displacement in and force out, for the system on which it is written.
 
-The library is compiled when the FMU is written, with the values of the model in it, so that an FMU reads no file while
-it runs. The compiler is that of zig, from the package `ziglang`. The sources need no C library.
+The library is compiled when the FMU is written and contains the values of the model, so that a running FMU reads no
+file. The compiler is zig, from the package `ziglang`. The sources need no C library.
 
 Source: Functional Mock-up Interface for Model Exchange and Co-Simulation, version 2.0.4.
 """

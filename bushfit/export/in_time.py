@@ -206,7 +206,7 @@ def _fields(model: Model, place: Place, names: Mapping[str, str], arms: tuple[Ar
 def _steady_omissions(
     model: Model, omitted: list[str], prediction: Prediction, conditions: RubberConditions
 ) -> list[str]:
-    """Write a sentence on the error of |K| in an FMU in which effects are omitted or held constant; none without error.
+    """Sentence on the error of |K| in an FMU in which effects are omitted or kept constant; none without an error.
 
     Args:
         model: model in the export, without effects of the rig.

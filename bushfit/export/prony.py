@@ -70,8 +70,9 @@ def prony_series(request: ExportRequest) -> list[PronySeries]:
         request: model, predictions and settings.
 
     Returns:
-        Series by ascending amplitude, each with the fewest terms that reach the accuracy. If no number of terms does,
-        the closest series: positive terms cannot follow friction, whose moduli are independent of frequency.
+        Series by ascending amplitude, each with the fewest terms that reach the accuracy. If no number of terms reaches
+        the accuracy, the closest series: positive terms cannot represent friction, whose modulus is independent of
+        frequency.
 
     Raises:
         ModelError: the model has no long-term modulus.
@@ -86,7 +87,7 @@ def prony_series(request: ExportRequest) -> list[PronySeries]:
         strain = shear_strain(request, amplitude)
 
         def relaxing_modulus(omega: Array, strain: float = strain) -> Array:
-            """Complex modulus minus the long-term one [Pa] at angular frequencies [rad/s] and a strain amplitude."""
+            """Complex modulus minus the long-term modulus [Pa], by angular frequency [rad/s] and strain amplitude."""
             return model.stiffness(COMPOUND, omega / (2.0 * np.pi), strain, conditions=request.conditions) - long_term
 
         arms = fitted_arms(

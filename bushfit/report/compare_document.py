@@ -104,8 +104,8 @@ class FamilyEntry(TypedDict):
         gain: mean square of the held-out parts of the first family minus that of this family, with its 95 %
             interval; null where nothing can be held out, and of the first.
         p: probability that chance alone causes this gain or loss, over all families (Holm).
-        probability: probability among the compared families; a smooth model error is included if that raises
-            the likelihood.
+        probability: probability among the compared families, with a smooth error of the model if this raises the
+            likelihood.
         parts: errors on each part of the tests that was held out.
         skipped: parts of the tests that were not held out, with the reason.
         words: sentence that compares the held-out error with that of the first family; empty for the first.

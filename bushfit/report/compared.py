@@ -38,7 +38,8 @@ def contrast_table(comparison: Comparison, contrast: Contrast) -> pd.DataFrame:
     """Table of stiffness and loss factor of two results at the same operating points, with the differences.
 
     Args:
-        comparison: comparison of the two results, which widens the 95 % bands to be valid at all points together.
+        comparison: comparison of the two results, which widens the 95 % bands so that they are valid at all points
+            together.
         contrast: stiffness and loss factor of both results at the points of one direction or specimen.
 
     Returns:
@@ -58,7 +59,7 @@ def contrast_table(comparison: Comparison, contrast: Contrast) -> pd.DataFrame:
 
 
 def contrast_headers(amplitude: str, stiffness: str) -> list[str]:
-    """Headers of the columns of `contrast_table`, from those of the amplitude and of the stiffness (or modulus)."""
+    """Headers of the columns of `contrast_table`, from the headers of amplitude and stiffness (or modulus)."""
     ends = ("", ", low", ", high")
     sides = [f"{side} {name}" for side in ("reference", "other") for name in (stiffness, LOSS)]
     differences = (f"relative difference of {split_header(stiffness)[0]} [-]", f"difference of {LOSS}")
@@ -175,10 +176,10 @@ class ComparisonDocument:
 
     @cached_property
     def differences(self) -> dict[str, list[PlaceDifferences]]:
-        """Differences of each result but the reference, by name of the direction or specimen.
+        """Differences of each result from the reference, by name of the direction or specimen.
 
         Raises:
-            ModelError: columns of a pair that do not go together.
+            ModelError: columns of a pair that do not match each other.
         """
         pairs, columns = self.document["pairs"], PlaceDifferences.from_columns
         places = pairs[0]["places"]

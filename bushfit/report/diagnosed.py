@@ -21,13 +21,13 @@ def gap_table(diagnosis: Diagnosis) -> pd.DataFrame:
     """Table of the gap, measured minus model, before and after the effects that a diagnosis adds to the model.
 
     The gap is in units of noise and in percent: of |K| for sweeps, of half the force range for loops. Frequency and
-    amplitude are those recorded, even if the diagnosis corrects a mistake in the record.
+    amplitude are listed as recorded, even if the diagnosis corrects a mistake in the record.
 
     Args:
         diagnosis: finished diagnosis with the models before and after.
 
     Returns:
-        A row per point of a sweep or row of a loop, with the measured response and that of the final model.
+        A row per point of a sweep or row of a loop, with the measured response and the response of the final model.
     """
     before, after = diagnosis.before, diagnosis.after
     tables = []

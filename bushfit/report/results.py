@@ -156,7 +156,7 @@ def write_results(
 ) -> list[str]:
     """Write the files of a result into a folder.
 
-    Numbers are written first and figures last: if a figure fails, all else has been saved.
+    Numbers are written first and figures last: if a figure fails, all other files are complete.
 
     Args:
         folder: results folder, made if it does not exist.
@@ -260,7 +260,7 @@ def check_free(folder: Path, names: Sequence[str], *, overwrite: bool, inputs: I
 
 
 def unwritable(folder: Path, error: OSError) -> OutputError:
-    """Make the error, to be raised, for a results folder that cannot be written."""
+    """Make the error for a results folder that cannot be written."""
     return OutputError(
         "the results cannot be written",
         file=folder,

@@ -88,9 +88,9 @@ def prediction_table(prediction: Prediction, display: Display | None = None) -> 
 
     Returns:
         Columns: frequency, amplitude, stiffness, loss factor, storage and loss stiffness; "low" and "high" ends of the
-        last four; the four again under the assumption that an unresolved effect belongs to the rig, if there is one;
-        measured stiffness and loss factor, if they are known; preload, if the tests have several; and the large
-        motion, if there is one.
+            last four; if there is an unresolved effect, the four again under the assumption that the effect belongs to
+            the rig; if known, measured stiffness and loss factor; if the tests have several preloads, the preload; and
+            the large motion, if there is one.
     """
     (length, length_factor), _, (stiffness, factor) = display or prediction.direction.display
     motion_name, _, resisted = quantity_words(prediction.direction)
@@ -329,7 +329,7 @@ def master_curve_table(shifted_sweeps: Sequence[ShiftedSweep]) -> pd.DataFrame:
 
 
 def bushings_table(bushings: Sequence[OtherBushings]) -> pd.DataFrame:
-    """Table of the errors with which a fit to the other bushings predicts each bushing.
+    """Table of the errors of each bushing, predicted by a fit to the other bushings.
 
     Returns:
         A row per bushing: name, points, NRMSE, reduced chi-square, mean gap of |K|, share of points in the band.
@@ -344,7 +344,8 @@ def shift_factors_table(shifted_sweeps: Sequence[ShiftedSweep]) -> pd.DataFrame:
     """Table of the temperature shift factors log10 a_T of sweeps, with 95 % intervals.
 
     Returns:
-        A row per sweep: temperature, shift factor by the law fitted to all sweeps, and that fitted to the sweep alone.
+        A row per sweep: temperature, shift factor of the law fitted to all sweeps, and shift factor fitted to the sweep
+        alone.
     """
     columns: dict[str, Any] = {
         "sweep": [shifted.sweep.name for shifted in shifted_sweeps],

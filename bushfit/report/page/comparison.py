@@ -97,7 +97,7 @@ def difference_sizes(one: PlaceDifferences) -> dict[str, str]:
 
 
 def value_rows(comparison: ComparisonDocument) -> Iterator[tuple[Any, ...]]:
-    """Rows of the table of values: the first result and each other one at a few operating points.
+    """Rows of the table of values: the first result and every other result at a few operating points.
 
     Args:
         comparison: validated comparison.

@@ -133,7 +133,7 @@ def _tests(tables: Mapping[str, pd.DataFrame]) -> dict[str, pd.DataFrame]:
 def _predictions(
     result: Result, tables: Mapping[str, pd.DataFrame], sweeps: pd.DataFrame | None
 ) -> dict[str, Prediction]:
-    """Compute a prediction on the grid of each prediction table, by its file name; without tables, of the sweeps.
+    """Compute a prediction on the grid of each prediction table, by its file name; without tables, on the sweeps' grid.
 
     Args:
         result: final model.

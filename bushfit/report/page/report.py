@@ -163,10 +163,10 @@ def comparable_sweeps(sweeps: pd.DataFrame | None, result: Result) -> pd.DataFra
 
 
 def group_warnings(warnings: Iterable[str]) -> dict[str, list[str]]:
-    """Group warnings that have the same meaning for the use of the numbers.
+    """Group warnings that have the same consequence for the use of the numbers.
 
     Returns:
-        Warnings by the sentence that says what they mean, the most important first.
+        Warnings by the sentence that states their consequence, the most important first.
     """
     groups = dict[str, list[str]]()
     for warning in by_importance(warnings):

@@ -125,7 +125,7 @@ def _rewrite(root: ElementTree.Element, prefix: str) -> None:
 
 
 def _share_attributes(root: ElementTree.Element) -> None:
-    """Move attributes that all children of a group share to the group, and drop those that a marker repeats."""
+    """Move attributes that all children of a group share to the group, and drop attributes that a marker repeats."""
     shapes = {f"#{element.get('id')}": element for element in root.iter() if element.get("id")}
     for marker in root.iter(f"{_SVG}use"):
         for key in {*marker.attrib} & {*shapes[marker.get("href", "")].attrib}:

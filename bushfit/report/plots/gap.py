@@ -141,7 +141,7 @@ def map_rows(group: SweepGroup) -> list[Curve]:
 def color_scale(sweeps: pd.DataFrame, sides: Sequence[str]) -> tuple[Array, ScalarMappable]:
     """Colour scale of the gap of sweeps: blue below the model, red above, grey between.
 
-    The end of the scale is chosen so that at most 2 % of the points are beyond it, up to 50 %.
+    The scale ends at the percentage that at most 2 % of the points exceed, and at 50 % at the most.
 
     Args:
         sweeps: rows of the sweeps in the table of the gap.

@@ -107,7 +107,7 @@ def fixed_settings(**settings: Any) -> Iterator[None]:
     """Context, or decorator of a function that makes a figure, without influence of the user's matplotlibrc.
 
     Args:
-        settings: settings of matplotlib that differ from those of all figures.
+        settings: settings of matplotlib that differ from the settings of all figures.
     """
     merged: dict[Any, Any] = {**_SETTINGS, **settings}
     with _LOCK, rc_context(merged), warnings.catch_warnings():
@@ -182,8 +182,8 @@ def styles(count: int, palette: str) -> list[Style]:
 
     Args:
         count: number of curves.
-        palette: colour scale, named after what distinguishes the curves: "amplitude", "frequency", "temperature" or
-            "loop".
+        palette: colour scale, named after the quantity that distinguishes the curves: "amplitude", "frequency",
+            "temperature" or "loop".
     """
     name, first, last = _SCALES[palette]
     colors = colormaps[name](np.linspace(first, last, count))
