@@ -34,7 +34,7 @@ _SOUGHT: dict[str, Callable[[Sequence[str]], Sequence[str]]] = {
 _TABLE: dict[str, Any] = tomllib.loads(Path(__file__).with_name("library.toml").read_text(encoding="utf-8"))
 #: Fields of an effect's record that the Python file of the effect may define.
 _LAW = (
-    *("modulus", "stress", "modulus_sensitivities", "stress_sensitivities", "in_place_of"),  # of a branch
+    *("modulus", "stress", "in_place_of"),  # of a branch
     *("adjust", "shift_factor", "stiffness", "force"),  # of a modifier, and of a layer
 )
 #: Kind of an effect, by the field that only this kind has.

@@ -253,10 +253,6 @@ class Branch(Effect):
     Args:
         modulus: (values, omega [rad/s], strain amplitude) -> complex modulus s~ / (2 e~) of the first harmonic [Pa].
         stress: (values, strain history) -> stress [Pa].
-        modulus_sensitivities: derivatives of the modulus with respect to the branch's parameters; None for numerical
-            derivatives.
-        stress_sensitivities: derivatives of the stress with respect to the branch's parameters; None for numerical
-            derivatives.
         uses: names of the paper's parameters that the branch reads.
         size: name of the parameter that the modulus of a linear viscoelastic branch is proportional to, so that Maxwell
             arms can replace the branch; None for other branches.
@@ -265,8 +261,6 @@ class Branch(Effect):
     level: Level = Level.MATERIAL
     modulus: Callable[[Values, Array, Array], Array]
     stress: Callable[[Values, History], Array]
-    modulus_sensitivities: Callable[[Values, Array, Array], dict[str, Array]] | None = None
-    stress_sensitivities: Callable[[Values, History], dict[str, Array]] | None = None
     uses: tuple[str, ...] = ()
     size: str | None = None
 

@@ -24,22 +24,6 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
     return np.asarray(p["mu"])
 
 
-def modulus_sensitivities(p: Values, omega: Array, strain: Array) -> dict[str, Array]:
-    """Derivatives of the complex modulus of the elastic branch with respect to its parameters.
-
-    Args:
-        p: parameter values by name: static shear modulus mu [Pa].
-        omega, strain: angular frequency [rad/s] and amplitude e0 of the tensor shear strain e = gamma/2 [1], (..., n).
-
-    Returns:
-        Derivatives by parameter name, each (..., n) [Pa per unit of the parameter].
-
-    Notes:
-        d/dmu = 1.
-    """
-    return {"mu": np.ones(1)}
-
-
 def stress(p: Values, history: History) -> Array:
     """Stress of the elastic branch.
 
@@ -54,19 +38,3 @@ def stress(p: Values, history: History) -> Array:
         s = 2 mu e (Garcia Tarrago et al. 2007, Eq. 1).
     """
     return 2.0 * p["mu"] * history.value
-
-
-def stress_sensitivities(p: Values, history: History) -> dict[str, Array]:
-    """Derivatives of the stress of the elastic branch with respect to its parameters.
-
-    Args:
-        p: parameter values by name: static shear modulus mu [Pa].
-        history: tensor shear strain e = gamma/2 over time [1], (..., n).
-
-    Returns:
-        Derivatives by parameter name, each (..., n) [Pa per unit of the parameter].
-
-    Notes:
-        d/dmu = 2 e.
-    """
-    return {"mu": 2.0 * history.value}

@@ -3,10 +3,9 @@
 Source: Garcia Tarrago et al. 2007, Eq. 5; M. Berg, Vehicle System Dynamics 30 (1998) 197-212.
 
 Notes:
-    With u = s_f / sigma_fmax, sgn = sign(de/dt) and d = |e - e_s| / eps_half counted from the last turning point (e_s,
-    u_s), Eq. (5) reads u = u_s + sgn d v / (v + d), v = 1 - sgn u_s. Only d depends on eps_half, and sigma_fmax is a
-    factor. So u is computed from one turning point to the next, with its derivative with respect to eps_half in closed
-    form.
+    With u = s_f / sigma_fmax, sgn = sign(de/dt) and d = |e - e_s| / eps_half counted from the last turning point
+    (e_s, u_s), Eq. (5) reads u = u_s + sgn d v / (v + d), v = 1 - sgn u_s. Only d holds eps_half, and sigma_fmax is a
+    factor. So u is computed from one turning point to the next.
 """
 
 from collections.abc import Sequence
@@ -26,8 +25,6 @@ _ROUNDS = 50
 _SETTLED = 1e-14
 #: T(z) = (ln(1 + z) - z + z^2/2)/z^3 as a power series in z: enough terms for all digits below _SERIES_BELOW.
 _SERIES = np.array([(-1.0) ** k / (k + 3.0) for k in range(12)])
-#: dT/dz as a power series in z.
-_SERIES_SLOPE = np.array([(k + 1) * (-1.0) ** (k + 1) / (k + 4.0) for k in range(11)])
 
 
 def harmonic_shape(x: Array) -> Array:
@@ -65,37 +62,6 @@ def harmonic_shape(x: Array) -> Array:
         big_less_2 = x * (x + 6.0) / (s + 1.0) + x
         shape.imag[small] = (2.0 * big_less_2 / big - 8.0 * x / p * series) / np.pi
     return shape
-
-
-def harmonic_slope(x: Array, shape: Array) -> Array:
-    """Derivative of the friction loop's complex first harmonic h with respect to the relative strain amplitude x.
-
-    Args:
-        x: strain amplitude over eps_half, any shape.
-        shape: `harmonic_shape(x)`.
-
-    Returns:
-        dh/dx, same shape.
-    """
-    s, big, p, q, z = _roots(x)
-    slope = np.empty(x.shape, dtype=complex)
-    slope_p = 4.0 / (s * (x + 3.0 + s))
-    slope_q = (slope_p * (p + x) + p) / q
-    slope.real = shape.real * (2.0 * slope_p / p - (1.0 + slope_p + slope_q) / (x + p + q) - slope_q / q)
-    far = np.maximum(x, _LEAST_X)
-    ratio = p * p / far
-    slope_ratio = (2.0 * p * slope_p - ratio) / far
-    slope_z = (2.0 - z * slope_p) / p
-    slope.imag = -((slope_ratio * np.log1p(z) + ratio * slope_z / (1.0 + z)) / np.pi + shape.imag) / far
-    small = z < _SERIES_BELOW
-    if small.any():
-        x, s, big, p, z, slope_p = x[small], s[small], big[small], p[small], z[small], slope_p[small]
-        series = np.polynomial.polynomial.polyval(z, _SERIES)
-        slope_series = np.polynomial.polynomial.polyval(z, _SERIES_SLOPE) * (2.0 - z * slope_p) / p
-        slope_big = (x + 3.0) / s + 1.0
-        bend = (1.0 - x * slope_p / p) * series + x * slope_series
-        slope.imag[small] = (4.0 * slope_big / big**2 - 8.0 / p * bend) / np.pi
-    return slope
 
 
 def _roots(x: Array) -> tuple[Array, Array, Array, Array, Array]:
@@ -149,29 +115,7 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
     return p["sigma_fmax"] / p["eps_half"] * harmonic_shape(strain / p["eps_half"])
 
 
-def modulus_sensitivities(p: Values, omega: Array, strain: Array) -> dict[str, Array]:
-    """Derivatives of the complex modulus of the friction branch with respect to its parameters.
-
-    Args:
-        p: parameter values by name: largest friction stress sigma_fmax [Pa], strain eps_half [1] that develops half.
-        omega, strain: angular frequency [rad/s] and amplitude e0 of the tensor shear strain e = gamma/2 [1], (..., n).
-
-    Returns:
-        Derivatives by parameter name, each (..., n) [Pa per unit of the parameter].
-
-    Notes:
-        d/dsigma_fmax = h/eps_half and d/deps_half = -sigma_fmax/eps_half^2 (h + x h'), x = e0/eps_half, h of
-        `harmonic_shape`.
-    """
-    x = strain / p["eps_half"]
-    shape = harmonic_shape(x)
-    return {
-        "sigma_fmax": shape / p["eps_half"],
-        "eps_half": -p["sigma_fmax"] / p["eps_half"] ** 2 * (shape + x * harmonic_slope(x, shape)),
-    }
-
-
-def _stroke(start: Any, sign: Any, distance: Any) -> tuple[Any, Any, Any]:
+def _stroke(start: Any, sign: Any, distance: Any) -> Any:
     """Friction stress u, relative to sigma_fmax, along one stroke, the motion between two turning points.
 
     Args:
@@ -179,29 +123,14 @@ def _stroke(start: Any, sign: Any, distance: Any) -> tuple[Any, Any, Any]:
         sign: +1 or -1, direction of the stroke.
         distance: strain d since the turning point, relative to eps_half, not negative.
 
-    Returns:
-        u, and two terms that its derivatives use: v = 1 - sign u_s and v + d.
-
     Notes:
-        u = u_s + sign d v/(v + d), Eq. 5 of Garcia Tarrago et al. (2007).
+        u = u_s + sign d v/(v + d), v = 1 - sign u_s, Eq. 5 of Garcia Tarrago et al. (2007).
     """
     room = 1.0 - sign * start
-    reach = room + distance
-    return start + sign * distance * room / reach, room, reach
+    return start + sign * distance * room / (room + distance)
 
 
-def _stroke_slopes(sign: Any, distance: Any, room: Any, reach: Any) -> tuple[Any, Any]:
-    """Derivatives of the relative friction stress u along a stroke with respect to its start value u_s and distance d.
-
-    Args:
-        sign: +1 or -1, direction of the stroke.
-        distance: strain d since the turning point, relative to eps_half.
-        room, reach: terms v and v + d of the equation of the stroke, as `_stroke` returns them.
-    """
-    return 1.0 - (distance / reach) ** 2, sign * (room / reach) ** 2
-
-
-def _strokes(senses: Sequence[Any], distances: Sequence[Any], u: Any) -> list[tuple[Any, Any, Any]]:
+def _strokes(senses: Sequence[Any], distances: Sequence[Any], u: Any) -> list[tuple[Any, Any]]:
     """Compute the friction stress u, relative to sigma_fmax, at the k + 1 turning points of k strokes.
 
     Args:
@@ -210,20 +139,21 @@ def _strokes(senses: Sequence[Any], distances: Sequence[Any], u: Any) -> list[tu
         u: relative stress at the first turning point.
 
     Returns:
-        For each turning point: u, du/d(ln eps_half) for a fixed start value, and the derivative with respect to the
-        start value.
+        For each turning point: u, and its derivative with respect to the stress at the first turning point.
+
+    Notes:
+        du/du_s = 1 - (d/(v + d))^2 along a stroke, with d and v of `_stroke`.
     """
-    path = [(u, 0.0 * u, 1.0 + 0.0 * u)]
+    path = [(u, 1.0 + 0.0 * u)]
     for sense, distance in zip(senses, distances, strict=True):
-        start, slope, memory = path[-1]
-        end, *room_and_reach = _stroke(start, sense, distance)
-        by_start, by_distance = _stroke_slopes(sense, distance, *room_and_reach)
-        path.append((end, by_start * slope - by_distance * distance, by_start * memory))
+        start, memory = path[-1]
+        share = distance / (1.0 - sense * start + distance)
+        path.append((_stroke(start, sense, distance), (1.0 - share**2) * memory))
     return path
 
 
-def _stress_at_turning_points(strides: Array, periodic: bool, eps_half: Array) -> tuple[Array, Array]:
-    """Friction stress over sigma_fmax, u, and du/d(ln eps_half), at the start of each of k strokes, (..., k) each.
+def _stress_at_turning_points(strides: Array, periodic: bool, eps_half: Array) -> Array:
+    """Friction stress over sigma_fmax, u, at the start of each of k strokes, (..., k).
 
     Args:
         strides: signed change of strain in each stroke (see `Turning`) [1], (..., k).
@@ -237,44 +167,23 @@ def _stress_at_turning_points(strides: Array, periodic: bool, eps_half: Array) -
     """
     scaled = strides / eps_half
     if strides.shape[-1] == 1 and periodic:  # at rest
-        return np.zeros_like(scaled), np.zeros_like(scaled)
+        return np.zeros_like(scaled)
     if strides.shape[-1] == 2 and periodic:
         x = np.abs(scaled) / 2.0
-        s = np.sqrt(x * (x + 6.0) + 1.0)
-        senses = -np.sign(scaled)  # each piece leads away from where it begins
-        return senses * 2.0 * x / (s + x + 1.0), -senses * 4.0 * x / (s * (x + 3.0 + s))
+        return -np.sign(scaled) * 2.0 * x / (np.sqrt(x * (x + 6.0) + 1.0) + x + 1.0)  # leads away from its start
     single = scaled.size == scaled.shape[-1]
     pieces = scaled.ravel() if single else np.moveaxis(scaled, -1, 0)
     signs, paths = (list[Any](value.tolist() if single else value) for value in (np.sign(pieces), np.abs(pieces)))
     u: Any = 0.0 if single else np.zeros_like(pieces[0])
-    path, first = _strokes(signs, paths, u), 0.0
+    path = _strokes(signs, paths, u)
     for _ in range(_ROUNDS if periodic else 0):
-        end, slope, memory = path[-1]
-        room = 1.0 - memory + (memory >= 1.0)  # one at rest keeps all
-        first, closer = slope / room, np.clip(u + (end - u) / room, -1.0, 1.0)
+        end, memory = path[-1]
+        closer = np.clip(u + (end - u) / (1.0 - memory + (memory >= 1.0)), -1.0, 1.0)  # one at rest keeps all
         if np.all(np.abs(closer - u) < _SETTLED):
             break
         u = closer.item() if single else closer
         path = _strokes(signs, paths, u)
-    turns = [(u, slope + memory * first) for u, slope, memory in path[:-1]]
-    u_at_turns, slopes = (np.stack(value, axis=-1).reshape(scaled.shape) for value in zip(*turns, strict=True))
-    return u_at_turns, slopes
-
-
-def _at_samples(eps_half: Array, history: History) -> tuple[Array, Array, Array, Array]:
-    """Friction stress at the start of each of the k strokes of a motion, and the travel of each of the n samples.
-
-    Args:
-        eps_half: friction parameter [1], (..., 1).
-        history: tensor shear strain e = gamma/2 over time [1], (..., n).
-
-    Returns:
-        Stress u relative to sigma_fmax, and du/d(ln eps_half), at the start of each stroke, (..., k) each; sign of each
-        sample's stroke, and strain since the start of this stroke relative to eps_half, (..., n) each.
-    """
-    turning, eps_half = history.turning, np.atleast_1d(np.asarray(eps_half, dtype=float))
-    sense, distance = np.sign(turning.travel), np.abs(turning.travel) / eps_half
-    return *_stress_at_turning_points(turning.strides, history.periodic, eps_half), sense, distance
+    return np.stack([u for u, _ in path[:-1]], axis=-1).reshape(scaled.shape)
 
 
 def stress(p: Values, history: History) -> Array:
@@ -295,25 +204,7 @@ def stress(p: Values, history: History) -> Array:
     >>> stress({"sigma_fmax": 2e4, "eps_half": 0.01}, History(np.array([0.01, 0.0, 0.01]), 1.0, False, 1.0)).round()
     array([10000., -2000.,  8476.])
     """
-    start, _, sense, distance = _at_samples(p["eps_half"], history)
-    return p["sigma_fmax"] * _stroke(history.turning.at_samples(start), sense, distance)[0]
-
-
-def stress_sensitivities(p: Values, history: History) -> dict[str, Array]:
-    """Derivatives of the stress of the friction branch with respect to its parameters.
-
-    Args:
-        p: parameter values by name: largest friction stress sigma_fmax [Pa], strain eps_half [1] that develops half.
-        history: tensor shear strain e = gamma/2 over time [1], (..., n).
-
-    Returns:
-        Derivatives by parameter name, each (..., n) [Pa per unit of the parameter].
-
-    Notes:
-        d/dsigma_fmax = u, the stress over sigma_fmax, and d/deps_half = sigma_fmax du/deps_half.
-    """
-    start, slope, sense, distance = _at_samples(p["eps_half"], history)
-    u, *room_and_reach = _stroke(history.turning.at_samples(start), sense, distance)
-    by_start, by_distance = _stroke_slopes(sense, distance, *room_and_reach)
-    slope = by_start * history.turning.at_samples(slope) - by_distance * distance  # by ln eps_half
-    return {"sigma_fmax": u, "eps_half": p["sigma_fmax"] * slope / p["eps_half"]}
+    turning, eps_half = history.turning, np.atleast_1d(np.asarray(p["eps_half"], dtype=float))
+    start = _stress_at_turning_points(turning.strides, history.periodic, eps_half)
+    distance = np.abs(turning.travel) / eps_half
+    return p["sigma_fmax"] * _stroke(turning.at_samples(start), np.sign(turning.travel), distance)

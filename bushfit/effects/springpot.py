@@ -7,9 +7,6 @@ from scipy.fft import next_fast_len
 
 from bushfit.effects.contract import Array, History, Value, Values, linear_stress
 
-#: Step of alpha in differences of the Gruenwald-Letnikov sum [1]: the cube root of rounding, which errs least.
-_ORDER_STEP = 1e-5
-
 
 def power_of_rate(alpha: Array, omega: Array) -> Array:
     """Compute (i omega)^alpha, the transfer function of a fractional derivative of order alpha at omega [rad/s]."""
@@ -33,24 +30,6 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
     array([100000., 469422.])
     """
     return 0.5 * p["m"] * power_of_rate(p["alpha"], omega)
-
-
-def modulus_sensitivities(p: Values, omega: Array, strain: Array) -> dict[str, Array]:
-    """Derivatives of the complex modulus of the springpot with respect to its parameters.
-
-    Args:
-        p: parameter values by name: springpot constant m [Pa s^alpha], order alpha [1].
-        omega, strain: angular frequency [rad/s] and amplitude e0 of the tensor shear strain e = gamma/2 [1], (..., n).
-
-    Returns:
-        Derivatives by parameter name, each (..., n) [Pa per unit of the parameter].
-
-    Notes:
-        d/dm = (i omega)^alpha / 2 and d/dalpha = m/2 (i omega)^alpha ln(i omega).
-    """
-    by_m = modulus({"m": 1.0, "alpha": p["alpha"]}, omega, strain)
-    safe = np.where(omega > 0.0, omega, 1.0)
-    return {"m": by_m, "alpha": p["m"] * by_m * (np.log(safe) + 0.5j * np.pi)}
 
 
 def fractional_derivative(alpha: Value, history: History) -> Array:
@@ -115,26 +94,3 @@ def stress(p: Values, history: History) -> Array:
     if history.periodic:
         return linear_stress(modulus, p, history)
     return p["m"] * fractional_derivative(p["alpha"], history)
-
-
-def stress_sensitivities(p: Values, history: History) -> dict[str, Array]:
-    """Derivatives of the stress of the springpot with respect to its parameters.
-
-    Args:
-        p: parameter values by name: springpot constant m [Pa s^alpha], order alpha [1].
-        history: tensor shear strain e = gamma/2 over time [1], (..., n).
-
-    Returns:
-        Derivatives by parameter name, each (..., n) [Pa per unit of the parameter].
-
-    Notes:
-        For a steady cycle harmonic by harmonic; from rest, the derivative with respect to alpha is a finite difference.
-    """
-    if not history.periodic:
-        alpha = p["alpha"]
-        ahead, behind = (fractional_derivative(alpha + h, history) for h in (_ORDER_STEP, -_ORDER_STEP))
-        by_alpha = p["m"] * (ahead - behind) / (2.0 * _ORDER_STEP)
-        return {"m": fractional_derivative(alpha, history), "alpha": by_alpha}
-    slopes = modulus_sensitivities(p, history.harmonics, history.amplitude)
-    both = history.response(lambda _: 2.0 * np.stack(list(slopes.values())))
-    return dict(zip(slopes, both, strict=True))

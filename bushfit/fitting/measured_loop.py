@@ -14,7 +14,7 @@ from bushfit.fitting.prepared_loop import PreparedLoop
 from bushfit.fitting.shared_errors import SharedErrors
 from bushfit.model.model import Model
 from bushfit.model.result import Outlier
-from bushfit.model.sensitivity import force_and_slopes, force_slopes_of_branches
+from bushfit.model.sensitivity import force_and_slopes
 from bushfit.reading.measurement import Loop
 from bushfit.reduction.harmonics import basis
 
@@ -154,11 +154,8 @@ class MeasuredLoop(MeasuredBase):
         if (rows := self._recall("jacobian", model, tuple(names))) is not None:
             return rows
         history = self.prepared.history(model.is_transient)
-        if model.only_branches:  # whose derivatives do not need the force
-            slopes = force_slopes_of_branches(model, self.direction, history, names)
-        else:
-            force, slopes = force_and_slopes(model, self.direction, history, names, self.test_conditions)
-            self._keep("force", model, (), self.prepared.interpolate_at_rows(force) + (self.prepared.datum or 0.0))
+        force, slopes = force_and_slopes(model, self.direction, history, names, self.test_conditions)
+        self._keep("force", model, (), self.prepared.interpolate_at_rows(force) + (self.prepared.datum or 0.0))
         rows = self.whiten(self.prepared.interpolate_at_rows(slopes) * self._per_noise)
         return self._keep("jacobian", model, tuple(names), rows)
 

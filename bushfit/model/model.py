@@ -138,11 +138,6 @@ class Model:
         return {condition for effect in self.records for condition in effect.depends_on}
 
     @property
-    def only_branches(self) -> bool:
-        """True if the model consists of branches only: their stresses add up, and no modifier and no layer acts."""
-        return len(self.structure.branches) == len(self.records)
-
-    @property
     def is_transient(self) -> bool:
         """True if the response changes from cycle to cycle until it is steady."""
         return any(effect.is_transient for effect in self.records)
