@@ -1,17 +1,15 @@
 """Spoiled inputs, one a row: the command line, what was done to its files, and what the one error has to say."""
 
 import json
-from collections.abc import Iterable, Iterator
+import re
+import tomllib
+from collections.abc import Iterator
 from dataclasses import dataclass, field
-from itertools import cycle
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from shell import RUBBER
-from spoiled_campaigns import IN_CAMPAIGN, IN_MORE, WHOLE_CAMPAIGNS
-from spoiled_models import IN_MODEL, IN_PREDICTED, WHOLE_MODELS
-from spoiled_tables import IN_LOOP, IN_RESONANCE, IN_SWEEP
-from spoiled_usage import LIMITS, MANIFESTS, USAGE
 
 CAMPAIGN = """\
 [bushing]
@@ -107,7 +105,6 @@ MODEL: dict[str, Any] = {
     "warnings": [],
     "provenance": {"bushfit": "0.1.0", "inputs": [], "packages": {}},
 }  # fmt: skip
-READING = ("fit-static", "fit-dynamic", "fit", "diagnose", "run", "plan")
 #: The formats that are written without a compiler.
 EXPORT = ("export", "model.json", *(f"--format={name}" for name in ("nastran", "abaqus", "adams", "csv", "xlsx")))
 
@@ -138,12 +135,6 @@ FILES = {
     "loop.csv": "\n".join(loop()) + "\n", "sweep.csv": "\n".join(sweep()) + "\n",
     "shaker.csv": "\n".join(shaker()) + "\n", "book.XLSX": "PK\x03\x04",
 }  # fmt: skip
-TAKING_MODELS = (
-    ("predict", "model.json"), ("compare", "model.json", "campaign.toml"), ("simulate", "model.json"),
-    ("plan", "model.json"), ("diagnose", "campaign.toml", "--model", "model.json"),
-    ("fit-static", "campaign.toml", "--dynamic", "model.json"),
-    ("fit-dynamic", "campaign.toml", "--static", "model.json"),
-)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -160,62 +151,48 @@ class Spoiled:
         return (self.command[0], *(() if self.command[0] == "schema" else ("-o", "x")), *self.command[1:])
 
 
-def campaigns() -> Iterator[Spoiled]:
-    """A text of the campaign replaced by another; the commands in turn."""
-    commands = cycle(READING)
-    for old, new, *says in IN_CAMPAIGN:
-        assert old in CAMPAIGN, old
-        text = CAMPAIGN.replace(old, new, 1)
-        name = f"{old.strip()} -> {new.strip()}"
-        yield Spoiled(name, (next(commands), "campaign.toml"), tuple(says), {"campaign.toml": text})
-    for old, new, *says in IN_MORE:
-        assert old in MORE, old
-        text = CAMPAIGN + MORE.replace(old, new, 1)
-        command = "simulate" if MORE.index(old) > MORE.index("[simulate]") else next(commands)
-        yield Spoiled(f"{old.strip()} -> {new.strip()}", (command, "more.toml"), tuple(says), {"more.toml": text})
-    for name, content, *says in WHOLE_CAMPAIGNS:
-        yield Spoiled(name, (next(commands), "campaign.toml"), tuple(says), {"campaign.toml": content})
+#: Inputs that are no text, or too long for a table of them: name, command, file, content, and what the error says.
+UNWRITTEN: list[tuple[str, str, str, str | bytes, list[str]]] = [
+    ("binary campaign", "run", "campaign.toml", b"\x89PNG\r\n\x1a\n\0\0", ["campaign.toml, line 3: the file is not UTF-8 text"]),
+    ("campaign in latin-1", "fit", "campaign.toml", 'name = "Gummi für Tür"'.encode("latin-1"), [
+        "campaign.toml, line 1: the file is not UTF-8 text", "iconv -f LATIN1 -t UTF-8 old > new",
+    ]),
+    ("campaign of 1 MB", "plan", "campaign.toml", CAMPAIGN + "#" * 1_000_001, ["campaign.toml: the file is too large"]),
+    ("a key of many parts", "fit", "campaign.toml", ".".join("a" * 5000) + " = 1\n", ["campaign.toml, line 1: the tables are nested too deeply"]),
+    ("deep lists", "fit", "campaign.toml", "a = " + "[" * 5000, ["campaign.toml: the tables are nested too deeply"]),
+    ("name without end", "predict", "model.json", json.dumps(MODEL).replace("Test", "x" * 5000), ["bushing.name: this value is not understood", "at most 200"]),
+    ("100 000 warnings", "predict", "model.json", json.dumps(MODEL | {"warnings": ["w"] * 100_000}), ["model.json, warnings: ", "at most 10000 items"]),
+    ("a warning of 5 MB", "predict", "model.json", json.dumps(MODEL | {"warnings": ["w" * 5_000_000]}), ["warnings #1: ", "at most 10000 characters"]),
+    ("an integer of many digits", "predict", "model.json", '{"schema": ' + "9" * 5000 + "}", ["model.json: this is not valid JSON"]),
+    ("a model of 10 MB", "predict", "model.json", " " * 10_000_001 + "{}", ["model.json: the file is too large"]),
+    ("binary loop", "fit", "loop.csv", b"\x00\x01\x02" * 100, ["loop.csv, line 1: this is not text", 'export it as "CSV UTF-8", or state encoding = "..."']),
+    ("a workbook cut short", "fit", "loop.csv", b"PK\x03\x04" + b"x" * 100, ["loop.csv: the workbook cannot be read", "save it again as xlsx"]),
+    ("zeros far behind the head", "fit", "loop.csv", FILES["loop.csv"].encode() * 40 + bytes(5), ["loop.csv, line ", "this is not text", "byte 0x00"]),
+    ("zeros in a file of Latin letters", "fit", "loop.csv", (FILES["loop.csv"] + "\xe4\n").encode("latin-1") * 40 + b"1,2\x00,3\n", ["this is not text", "byte 0x00"]),
+]  # fmt: skip
 
 
-def models() -> Iterator[Spoiled]:
-    """One entry of the model file changed; the commands that take a model in turn, and export each."""
-    commands = cycle(TAKING_MODELS)
-    for rows, taking in ((IN_MODEL, commands), (IN_PREDICTED, cycle(TAKING_MODELS[:1]))):
-        for name, change, *says in rows:
-            document = json.loads(json.dumps(MODEL))
-            change(document)
-            yield from given(name, next(taking), says, json.dumps(document))
-    for name, content, *says in WHOLE_MODELS:
-        yield from given(name, next(commands), says, content)
+def listed() -> Iterator[Spoiled]:
+    """The rows of the tables in tests/files/spoiled; what is wrong with a model is told by `export`, too."""
+    for table in sorted((Path(__file__).parents[1] / "files" / "spoiled").iterdir()):
+        for row in tomllib.loads(table.read_text(encoding="utf-8"))["rows"]:
+            name, files = row.get("name", f"{row['command']} {row.get('new', '')}"), dict[str, str | bytes | None]()
+            if "missing" in row:
+                files[row["missing"]] = None
+            elif "text" in row:
+                files[row["file"]] = row["text"]
+            elif "pattern" in row:
+                files[row["file"]] = re.sub(row["pattern"], row["new"], FILES[row["file"]])
+            elif "file" in row:
+                assert row["old"] in FILES[row["file"]], row
+                files[row["file"]] = FILES[row["file"]].replace(row["old"], row["new"], 1)
+            yield Spoiled(name, tuple(row["command"].split("|")), tuple(row["says"]), files)
+            if table.stem == "models":
+                yield Spoiled(f"export: {name}", EXPORT, tuple(row["says"]), files)
 
 
-def given(name: str, command: tuple[str, ...], says: Iterable[str], model: str | bytes | None) -> Iterator[Spoiled]:
-    """A model file, to a command and to export."""
-    yield Spoiled(name, command, tuple(says), {"model.json": model})
-    yield Spoiled(f"export: {name}", EXPORT, tuple(says), {"model.json": model})
-
-
-def tables() -> Iterator[Spoiled]:
-    """Rows of the measured tables changed."""
-    commands = cycle(READING)
-    for name, change, *says in IN_LOOP:
-        yield Spoiled(f"loop: {name}", (next(commands), "campaign.toml"), tuple(says), {"loop.csv": change(loop())})
-    for name, change, *says in IN_SWEEP:
-        yield Spoiled(f"sweep: {name}", (next(commands), "campaign.toml"), tuple(says), {"sweep.csv": change(sweep())})
-    for name, change, *says in IN_RESONANCE:
-        command = ("reduce", "shaker.csv", "--mass", "0.5 kg", "--direction", "axial")
-        yield Spoiled(f"resonance: {name}", command, tuple(says), {"shaker.csv": change(shaker())})
-
-
-def typed() -> Iterator[Spoiled]:
-    """Command lines, and limits and manifests of a batch."""
-    for command, *says in USAGE:
-        yield Spoiled(command, tuple(command.split("|")), tuple(says))
-    for text, *says in LIMITS:
-        command = ("batch", "campaign*.toml", "--limits", "judge.toml")
-        yield Spoiled(f"limits: {text}", command, tuple(says), {"judge.toml": text + "\n"})
-    for name, text, *says in MANIFESTS:
-        yield Spoiled(f"{name}: {text}", ("batch", name), (name, *says), {name: text})
-
-
-ROWS = [*campaigns(), *models(), *typed(), *tables()]
+ROWS = [
+    *listed(),
+    *(Spoiled(name, (command, file if file != "loop.csv" else "campaign.toml"), tuple(says), {file: content})
+      for name, command, file, content, says in UNWRITTEN),
+]  # fmt: skip

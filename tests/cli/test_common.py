@@ -16,7 +16,7 @@ from pathlib import Path
 import click
 import pytest
 from click.testing import CliRunner
-from shell import CAMPAIGN, GEOMETRY, names, refused, values
+from shell import CAMPAIGN, GEOMETRY, names, values
 from spoiled import FILES, MODEL
 
 from bushfit.cli import cli, main
@@ -108,36 +108,6 @@ def test_an_input_of_the_run_is_not_replaced(own, typed):
     refused = typed("diagnose", "campaign.toml", "--model", "x/model.json", "-o", "x", "--force", status=2)
     assert "x/model.json: a result would replace an input of this run" in refused.stderr
     assert {file.name: file.read_bytes() for file in own.glob("*.*")} == before
-
-
-def test_commands_one_after_the_other_need_no_folder_of_results(typed, root, work, tmp_path):
-    folder = tmp_path / "results/CMP 15 961"
-    typed("fit", work / CAMPAIGN, "--no-plots")
-    assert f'try: name "{Path("results/CMP 15 961/fit")}"' in typed("predict", "results/CMP 15 961", status=2).stderr
-    (folder / "fit/model.json").rename(folder / "model.json")  # as run writes it
-    for command, *more in (
-        ("predict", folder), ("respond", folder, root / "data/road/axial_radial.csv"), ("fit-static", work / CAMPAIGN),
-        ("export", folder, "--format", "nastran"), ("diagnose", work / CAMPAIGN), ("plan", folder, "--hours", "1"),
-    ):  # fmt: skip
-        typed(command, *more, "--no-plots")
-        assert len(names(folder / command)) > 0
-
-
-@pytest.mark.parametrize(
-    ("arguments", "slow"),
-    [
-        (["--help"], {"numpy", "pandas", "scipy", "matplotlib", "lmfit", "pint", "pydantic", "rich"}),
-        (["fit", CAMPAIGN, "--no-plots", "-q", "-o", "quick"], {"pint", "matplotlib.pyplot", "distributed"}),
-    ],
-    ids=["help", "fit"],
-)
-def test_slow_packages_are_imported_where_they_are_needed(work, arguments, slow):
-    code = (
-        f"import sys\nfrom bushfit.cli import main\nsys.argv = {['bushfit', *arguments]!r}\n"
-        f"try:\n    main()\nfinally:\n    assert not {slow!r} & set(sys.modules)\n"
-    )
-    done = subprocess.run([sys.executable, "-c", code], cwd=work, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -264,21 +234,6 @@ def test_json_is_utf8_in_any_code_page_and_no_text_steers_the_terminal(folder):
     assert not any(sign in done.stderr.decode() for sign in "\x1b\x9b\u202e")
 
 
-def test_ctrl_c_in_a_callback_of_an_import_is_not_lost():
-    """Python ignores what a callback of a weak reference raises, and imports have such callbacks."""
-    code = (
-        "import signal, sys, time, weakref; from bushfit.__main__ import repeat_interrupt\n"
-        "signal.signal(signal.SIGINT, signal.default_int_handler); sys.unraisablehook = repeat_interrupt\n"
-        "class Lock: pass\n"
-        "lock = Lock(); reference = weakref.ref(lock, lambda _: signal.raise_signal(signal.SIGINT)); del lock\n"
-        "for _ in range(2000): time.sleep(0.01)"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    assert done.returncode != 0
-    assert done.stderr.splitlines()[-1] == "KeyboardInterrupt"
-    assert "ignored" not in done.stderr
-
-
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows sends no such signal")
 @pytest.mark.parametrize(("after", "sent"), [(0.1, signal.SIGINT), (0.5, signal.SIGINT), (1.5, signal.SIGTERM)])
 def test_an_early_ctrl_c_and_a_request_to_end(after, sent, folder):
@@ -352,15 +307,6 @@ def test_the_manual_is_one_file_whose_links_stay_in_it(bushfit, root, tmp_path):
     assert len(targets) > 30
     assert "src=" not in text
     assert text.count("<table>") > 20
-
-
-def test_without_a_folder_the_browser_opens_at_the_page(bushfit, monkeypatch):
-    opened = list[str]()
-    monkeypatch.setattr("click.launch", opened.append)
-    bushfit("manual", "fitting")
-    assert len(opened) == 1
-    assert re.fullmatch(r"file:///.*/manual\.html#fitting", opened[0])
-    refused(bushfit("manual", "fiting", status=2), Path("nowhere"), "no such page", 'did you mean "fitting"?')
 
 
 def test_the_example_runs_and_gives_back_its_parameters(bushfit, table_1, tmp_path):

@@ -71,25 +71,6 @@ def test_a_ripple_is_no_loop(typed, root, tmp_path, ripple):
         assert float(said[0].split()[4]) == pytest.approx(ripple[0] / 100.0, rel=0.25)
 
 
-@pytest.mark.parametrize("shape", ["triangle", "trapezoid", "zero to full", "one cycle"])
-def test_other_slow_motions_with_a_ripple(typed, tmp_path, shape):
-    cycles = {"one cycle": 1.0}.get(shape, 3.0)
-    time = np.arange(0.0, 50.0 * cycles, 0.02)
-    phase = 0.02 * time
-    triangle = 2.0 / np.pi * np.arcsin(np.sin(2.0 * np.pi * phase))
-    slow = {
-        "triangle": triangle,
-        "trapezoid": np.clip(2.0 * triangle, -1.0, 1.0),
-        "zero to full": 0.5 - 0.5 * np.cos(2.0 * np.pi * phase),
-        "one cycle": np.sin(2.0 * np.pi * phase),
-    }[shape]
-    scatter = 3e-4 * np.random.default_rng(2).standard_normal(time.size)
-    record(tmp_path / "axial.csv", time, slow + sine(time, 0.4, 9.0) + scatter, 300.0 * slow + 20.0 * np.gradient(slow))
-    facts = inspected(typed, "axial.csv")["facts"]
-    assert facts["cycles"].startswith(f"{cycles:g},")
-    assert facts["frequency"].startswith("0.02 Hz")
-
-
 def test_a_fit_is_the_same_with_a_ripple(bushfit, work, own):
     time, motion, force = measured(own)
     record(own / "data/cmp_15961/loop_axial_1.csv", time, motion + sine(time, 0.5, 25.0), force)

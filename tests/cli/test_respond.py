@@ -107,15 +107,6 @@ def test_a_channel_that_never_moves_is_left_out(bushfit, tmp_path):
     assert list(pd.read_csv(tmp_path / "out/response.csv"))[1] == "displacement [mm]"
 
 
-def test_channels_of_a_steady_state_keep_one_length(bushfit, tmp_path):
-    """The last row repeats the first, which one channel alone, flat at its start, does not show."""
-    flat = np.maximum(np.sin(2.0 * np.pi * TIME / TIME[-1]) - 0.5, 0.0)
-    sine = np.sin(2.0 * np.pi * 4.0 * TIME / TIME[-1])
-    road = write(tmp_path, time__s=TIME, axial_displacement__mm=0.2 * sine, radial_displacement__mm=0.1 * flat)
-    bushfit("respond", "model", road, "--steady", "-o", tmp_path / "out", "--no-plots")
-    assert len(pd.read_csv(tmp_path / "out/response.csv")) == N - 1
-
-
 def test_a_batch_responds_for_each_part(bushfit, work, tmp_path):
     write(tmp_path, time__s=TIME, axial_displacement__mm=MOTION)
     model, campaign = work / "model/model.json", work / "configs/cmp_15961.toml"
@@ -131,13 +122,3 @@ def test_a_batch_responds_for_each_part(bushfit, work, tmp_path):
     manifest.write_text(f"{settings}[[bushings]]\ncampaign = '{campaign}'\n")
     done = bushfit("batch", manifest, "-o", tmp_path / "none", status=2)
     assert "respond has no displacement history" in done.stderr
-
-
-@pytest.mark.slow
-def test_a_million_rows(bushfit, tmp_path):
-    time = np.arange(1_000_000) * 1e-3
-    random = np.random.default_rng(1)
-    motion = sum(np.sin(2.0 * np.pi * f * time + p) for f, p in random.uniform(0.5, 7.0, (20, 2)))
-    road = write(tmp_path, time__s=time, axial_displacement__mm=0.05 * motion)
-    bushfit("respond", "model", road, "-o", tmp_path / "out")
-    assert (tmp_path / "out/response.csv").read_bytes().count(b"\n") == 1_000_001

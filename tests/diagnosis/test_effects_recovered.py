@@ -141,22 +141,6 @@ def test_the_family_that_made_the_tests_is_the_best_and_known_to_be(paper_model,
         assert found["kraus"].words.endswith("worse by more than chance")
 
 
-@pytest.mark.slow
-def test_the_interval_of_the_gain_is_that_of_noise(paper_model):
-    """Two wrong families: redrawn noise moves the gain of one over the other as its interval says."""
-    gains = []
-    made = paper_model.with_effect("intrinsic_time", {"intrinsic_time.d": 1.0})
-    clean = undisturbed(made, PLAN)
-    for seed in range(8):
-        made = begun(paper_model, measure(clean, replace(PLAN, seed=seed)).campaign())
-        (_, other), _ = fit_families(*made, ["fractional_zener"], (), {})
-        assert other.gain is not None
-        gains.append(other.gain)
-    value, low, high = np.array(gains).T
-    said, real = float(np.mean(high - low)) / 3.92, float(value.std(ddof=1))
-    assert 0.4 < said / real < 2.5
-
-
 def test_the_interval_of_the_gain_grows_with_the_misfit(paper_model):
     """Noise that is stated as half makes residuals of twice the size, and four times the gain and its interval."""
     made = paper_model.with_effect("intrinsic_time", {"intrinsic_time.d": 3.0})

@@ -83,17 +83,6 @@ def test_an_export_is_read_right_or_raises_a_question(case, tmp_path):
         check(test, expected(case.get("expected", case["kind"])), 0.06 if "spread" in notes else 2e-3)
 
 
-def test_a_ripple_of_half_a_percent_is_no_test_of_its_own(tmp_path):
-    time = np.arange(15_000) * 2e-3
-    phase = 0.2 * np.pi * time
-    columns = time, np.sin(phase) + 0.005 * np.sin(250.0 * phase), 1000.0 * np.sin(phase + 0.1)
-    header = "time [s],displacement [mm],force [N]"
-    np.savetxt(tmp_path / "hum.csv", np.array(columns).T, "%.6f", ",", header=header, comments="")
-    document, (test,) = inspected(tmp_path, "hum.csv")
-    assert document["files"][0]["facts"]["frequency"] == "0.1 Hz, a sine"
-    check(test, {"displacement": 1e-3 * columns[1], "force": columns[2]})
-
-
 @pytest.mark.parametrize(
     ("name", "is_odd"), [("axial_20Hz.csv", False), ("axial_0.1Hz.csv", False), ("axial_5Hz.csv", True)]
 )
