@@ -310,13 +310,13 @@ def _entry_document(label: str, entry: ComparedResult) -> ComparedEntry:
 
 def _family_document(label: str, family: FittedFamily, result: Result) -> FamilyEntry:
     """Entry of a model family in compare.json, with its held-out residual; `label` is its letter in tables."""
-    evidence, held_out = family.evidence, family.holdout
+    fit, held_out = family.fit, family.holdout
     return {
         "label": label,
         "name": family.name,
-        "parameters": evidence.parameters,
-        "reduced_chi_square": result.quality.reduced_chi_square if result.quality else evidence.reduced_chi_square,
-        "bic": evidence.bic,
+        "parameters": len(fit.names),
+        "reduced_chi_square": result.quality.reduced_chi_square if result.quality else fit.reduced_chi_square,
+        "bic": family.bic,
         "heldout": held_out.after,
         "first_there": held_out.before,
         "gain": family.gain,

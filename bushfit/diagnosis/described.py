@@ -7,7 +7,6 @@ import numpy as np
 
 from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.document import Description
-from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.holdout import HoldOut, HoldOutPart
 from bushfit.diagnosis.locate import find_regions
 from bushfit.diagnosis.power_law import PowerLaw, nearest_power_law
@@ -41,7 +40,7 @@ class GapDescription:
         evidence: text on the range of tests in which the correction is valid.
     """
 
-    after: Evidence
+    after: FitResult
     fitted: FitResult
     holdout: HoldOut
     power_law: PowerLaw | None
@@ -57,12 +56,12 @@ class GapDescription:
 
 
 def describe(
-    evidence: Evidence,
+    fit: FitResult,
     rig: RigSettings,
     start: Mapping[str, float],
     bounds: Bounds,
     *,
-    before: Evidence | None = None,
+    before: FitResult | None = None,
     has_candidates: bool = False,
 ) -> GapDescription | None:
     """Describe the gap (measured minus modelled stiffness) by a correction smooth in ln frequency and ln strain.
@@ -71,11 +70,11 @@ def describe(
     so loops are represented by their first harmonic.
 
     Args:
-        evidence: the fitted model and the tests.
+        fit: the fitted model and the tests.
         rig: stated accuracy class of the rig (gain and phase errors).
         start: starting values estimated from the data, because the gap distorts the fitted parameters.
         bounds: limits of parameters inside their general limits.
-        before: fit whose held-out residuals are compared with those of the correction; None for `evidence`.
+        before: fit of the starting model, to compare held-out residuals with; None for `fit`.
         has_candidates: True if known effects explain the gap, so that the gap is certain and its form is known.
 
     Returns:
@@ -83,37 +82,37 @@ def describe(
         reduce the held-out residuals) or has an error larger than the gap, if the model has a correction already, or if
         the first harmonics cannot be fitted.
     """
-    if NAME in evidence.model.effects:
+    if NAME in fit.model.effects:
         return None
-    law, harmonic = None, tuple(test.fundamental() for test in evidence.data_sets)
-    fitted, correction = with_model_error(evidence.solution, bounds, rig, smooth=True, certain=has_candidates)
+    law, harmonic = None, tuple(test.fundamental() for test in fit.data_sets)
+    fitted, correction = with_model_error(fit, bounds, rig, smooth=True, certain=has_candidates)
     if correction is None or correction.uncertainty >= 1.0:
         return None
     half = Z95 * correction.uncertainty * correction.largest
     sentence = f"up to {number(100.0 * correction.largest, 2)} ± {number(100.0 * half, 2)} % of |K|"
     if not has_candidates:
         try:
-            problem = FitProblem.with_fixed(evidence.model, harmonic, evidence.fixed, bounds)
+            problem = FitProblem.with_fixed(fit.model, harmonic, fit.fixed, bounds)
             base = Descent.start(problem).run(_EVALUATIONS).solution
-            problem = FitProblem.with_fixed(base.model, harmonic, (*evidence.fixed, *base.at_bound), bounds)
+            problem = FitProblem.with_fixed(base.model, harmonic, (*fit.fixed, *base.at_bound), bounds)
             base = Descent.start(problem).run(_EVALUATIONS).solution
         except FitError:  # too few points are left for the parameters
             return None
-        law = nearest_power_law(Evidence(base), rig, start, bounds)
+        law = nearest_power_law(base, rig, start, bounds)
         law = law if law and law.is_likely and any(law.determined) else None
         sentence += f"; {law.sentence if law else 'its form is not a power law'}"
-    model = replace(fitted.model, effects=(*evidence.model.effects, NAME), unnamed=correction)
-    after = Evidence(fitted.reevaluate(model, harmonic))
-    whole = Evidence(fitted.reevaluate(model, evidence.data_sets))
+    model = replace(fitted.model, effects=(*fit.model.effects, NAME), unnamed=correction)
+    plain = replace(fitted, noise_weighted=())  # residuals of the tests with their noise alone
+    after, whole = plain.reevaluate(model, harmonic), plain.reevaluate(model, fit.data_sets)
     if has_candidates:
-        beside_effects = _hold_out_inside(evidence, fitted)
+        beside_effects = _hold_out_inside(fit, fitted)
         if (beside_effects.after or 0.0) >= (beside_effects.before or np.inf):
             return None
-    holdout = _hold_out_inside(before or evidence, fitted)
+    holdout = _hold_out_inside(before or fit, fitted)
     return GapDescription(after, fitted, holdout, law, sentence, _validity(correction, whole))
 
 
-def _hold_out_inside(before: Evidence, fitted: FitResult) -> HoldOut:
+def _hold_out_inside(before: FitResult, fitted: FitResult) -> HoldOut:
     """Predict parts of the sweeps inside the tested range from the other parts, without and with the correction.
 
     Args:
@@ -124,7 +123,7 @@ def _hold_out_inside(before: Evidence, fitted: FitResult) -> HoldOut:
         Root mean square residuals, without and with the correction, of every third frequency (or amplitude, where that
         is stepped), of the middle level and of the last repeat of the sweeps.
     """
-    solution, tests = before.solution, before.data_sets
+    tests = before.data_sets
     chosen: dict[str, dict[MeasuredTest, Array]] = {}
     for sweep in split_by_kind(tests)[1]:
         rank = np.unique(sweep.step, return_inverse=True)[1]
@@ -138,7 +137,7 @@ def _hold_out_inside(before: Evidence, fitted: FitResult) -> HoldOut:
         for name, mask in masks.items():
             if mask.any():
                 chosen.setdefault(name, {})[sweep] = mask
-    both = [LeaveOut.from_fit(fit.jacobian[fit.moving], fit.residual) for fit in (solution, fitted)]
+    both = [LeaveOut.from_fit(fit.jacobian[fit.moving], fit.residual) for fit in (before, fitted)]
     residuals = dict[str, Array]()
     for name, by_sweep in chosen.items():
         rows = HoldOutPart.of_tests(name, by_sweep, tests).rows(tests)
@@ -148,7 +147,7 @@ def _hold_out_inside(before: Evidence, fitted: FitResult) -> HoldOut:
     return HoldOut.from_residuals(residuals)
 
 
-def _validity(correction: Unnamed, whole: Evidence) -> str:
+def _validity(correction: Unnamed, whole: FitResult) -> str:
     """Sentence on the tested range in which the correction is valid, and on the remaining misfit of the worst loop."""
 
     def span(values: Sequence[float], factor: float = 1.0) -> str:

@@ -1,67 +1,56 @@
-"""Explanations of a gap between model and tests: smooth curves, the compound's deviation, clusters of outliers.
+"""Explanations of a gap between model and tests, each with the residual changes that it would cause."""
 
-Smooth curves without a name and the compound's own deviation are Gaussian processes over ln frequency and ln strain
-(Kennedy and O'Hagan, 2001). No rubber follows a few parameters exactly. The deviation of the compound is the same
-function in every direction and on every specimen, while errors of a rig differ between them. So the deviation is part
-of every hypothesis, with the sizes and weights of `priors.COMPOUND`, and no effect is named for a gap that it explains.
-Where a compound deviates, the one strain that stands for the uneven field of a direction is inexact too.
-"""
-
-from __future__ import annotations
-
-from collections import defaultdict
-from collections.abc import Callable, Hashable, Sequence
-from dataclasses import dataclass, field, replace
-from itertools import combinations
-from math import log
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import block_diag
-from scipy.special import bdtrc
 
-from bushfit.diagnosis.evidence import Evidence
-from bushfit.diagnosis.groups import Group
 from bushfit.effects.contract import Array
-from bushfit.fitting.discrepancy import COMPOUND_LENGTHS
-from bushfit.fitting.loop_harmonics import SMOOTH_HARMONICS
-from bushfit.fitting.preparation import (
-    SAME_LOOP,
-    MeasuredLoop,
-    MeasuredSweep,
-    MeasuredTest,
-    group_repeats,
-    split_by_kind,
-)
-from bushfit.gaussian_process import coordinates, in_lengths, matern, patterns
-from bushfit.geometry import Place, stiffness_per_modulus
-from bushfit.model.model import Model
-from bushfit.model.result import Outlier
-from bushfit.reading.measurement import SAME_TEMPERATURE
-from bushfit.reduction.harmonics import basis
 
-#: Name of the compound's own deviation among explanations without a name.
-COMPOUND = "compound"
-#: Number of patterns of the compound's deviation: with three to five levels more improve nothing.
-_COMPOUND_PATTERNS = 12
-#: Fraction of the compound's deviation that changes over the shorter lengths of a smooth curve: yield and breakdown set
-#: in within a factor of 2 or 3 of the strain.
-_COMPOUND_ROUGHNESS = 0.25
-#: Correlation lengths of a curve without a name in ln frequency and ln strain: smooth, and rough.
-_CURVE_LENGTHS = {"smooth": (1.5, 1.2), "rough": (0.5, 0.5)}
-#: Limits of a curve: number of its nodes and patterns, and least variance of a pattern relative to the largest.
-_CURVE_PATTERNS = {"nodes": 150, "count": 16, "minimum": 1e-4}
-#: Last overtone of a compound's deviation in a steady cycle, and number of waves of its deviation in the first cycle.
-_LAST_OVERTONE, _TRANSIENT_WAVES = 13, 6
-#: Number of phases of a cycle at which harmonics are summed: about six per period of the highest harmonic.
-_PHASES = 32
-#: Error of ln strain in one direction over the deviation of the compound: 10 % beside the usual 2 %, because one strain
-#: stands for an uneven field; and step of ln strain in difference quotients. With this error the 95 % interval of a
-#: radial stiffness factor contained its true value in 115 of 118 simulated campaigns of 14 rubbers of other laws.
-_STRAIN_ERROR, _STRAIN_STEP = 5.0, 1e-3
-#: Loss modulus of relaxation faster than the tests, at their highest frequency, over the deviation of the compound;
-#: chosen on simulated rubber. In 28 campaigns of 7 other rubbers the 95 % interval contained the true delay in 27.
-_FAST_RELAXATION = 1.5
+#: Relative change of |K| per unit amount below which the tests do not show a column.
+_UNSEEN = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """Changes of the residuals that one explanation of a gap would cause: c columns with Gaussian amounts.
+
+    Args:
+        columns: change of the n whitened residuals per unit amount of each column, (c, n).
+        unit: relative change of |K| per unit amount of each column, (c,); complex, at p operating points, (c, p), if
+            `act_together`.
+        act_together: True if all columns act at once with independent amounts of one prior size; False if exactly one
+            column acts, each with equal probability.
+        sign: +1 if only positive amounts are possible (only without `act_together`); else 0.
+        covered_rows: slice of the residuals that `columns` covers, and the number of all residuals; None for all.
+    """
+
+    columns: Array
+    unit: Array
+    act_together: bool
+    sign: int = 0
+    covered_rows: tuple[slice, int] | None = None
+
+    @property
+    def whole(self) -> Array:
+        """Changes of all n residuals per unit amount of each column, (c, n)."""
+        if self.covered_rows is None:
+            return self.columns
+        rows, count = self.covered_rows
+        whole = np.zeros((len(self.columns), count))
+        whole[:, rows] = self.columns
+        return whole
+
+    @property
+    def scaled(self) -> Array:
+        """Changes of all n residuals for the c columns, scaled for the prior of their amounts, (c, n).
+
+        If the columns are alternatives, each is divided by its change of |K|, so that an amount of 1 changes |K| by
+        100 %, and is zero if it does not change |K|. Columns that act together are not scaled.
+        """
+        if self.act_together:
+            return self.whole
+        visible = self.unit > _UNSEEN
+        return self.whole * np.where(visible, 1.0 / np.where(visible, self.unit, 1.0), 0.0)[:, None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,333 +71,3 @@ class Explanation:
     family: str
     name: str
     group: Group | None
-
-
-@dataclass(frozen=True, eq=False)
-class FaultyPart(Explanation):
-    """Explanation of a gap by a fault of the tests: a frequency, level, repeat or loop whose points deviate together.
-
-    A level is the set of all points of a sweep at one constant amplitude, or at one constant frequency.
-
-    Args:
-        direction: direction or specimen of the first test.
-        frequency: lowest and highest frequency of the faulty points [Hz].
-        amplitude: their smallest and largest amplitude, zero-to-peak [m or rad].
-        may_be_physics: True if an effect that the model lacks could change the same points, and not a wrong test: the
-            smallest or largest level of a direction, a loop that no other test covers, or frequencies in all directions
-            at every amplitude.
-    """
-
-    direction: Place
-    frequency: tuple[float, float]
-    amplitude: tuple[float, float]
-    may_be_physics: bool = field(default=False, kw_only=True)
-
-    @property
-    def columns(self) -> Array:
-        """Changes of the n whitened residuals per unit of c errors: gain, phase [rad] and their slopes, (c, n)."""
-        assert self.group is not None
-        return self.group.whole
-
-    def point_by_point(self) -> FaultyPart:
-        """Fault of the same sweep points, each with an independent error in place of a common shift or slope.
-
-        Returns:
-            Faulty part with one column for each residual of its points.
-        """
-        size = np.abs(self.columns).max(axis=0)
-        rows = np.flatnonzero(size)
-        columns = np.zeros((rows.size, size.size))
-        columns[np.arange(rows.size), rows] = size[rows]
-        return replace(self, group=Group(columns, np.eye(rows.size), act_together=True))
-
-    def distance(self, residual: Array) -> float:
-        """Root mean square deviation of this part's points from the model, in units of noise.
-
-        Args:
-            residual: whitened residuals of all tests, (n,).
-        """
-        columns = self.columns
-        amounts = columns @ residual / np.maximum(np.linalg.norm(columns, axis=1), 1e-300)
-        return float(np.sqrt(np.mean(amounts**2)))
-
-
-@dataclass(frozen=True, eq=False)
-class OutlierCluster(FaultyPart):
-    """Explanation of several outliers at one frequency, all left out of the fit, by a disturbance at that frequency.
-
-    Args:
-        outlier_distance: root mean square distance of the outliers from the model, in units of noise.
-        size: largest distance of a point from the model, |K_model - K_measured|/|K_measured|.
-        log_odds: natural log of the odds of a disturbance against a chance coincidence of single wrong rows.
-    """
-
-    outlier_distance: float
-    size: float
-    log_odds: float
-
-    def distance(self, residual: Array) -> float:  # noqa: ARG002
-        return self.outlier_distance
-
-
-def is_pattern(faulty_parts: Sequence[FaultyPart]) -> bool:
-    """True if suspected faults of the tests form a pattern, which may be an effect that the model lacks.
-
-    Patterns are faults at several frequencies, as by a resonance, or at frequencies of all directions; at the smallest
-    or largest level, as by a contact; or of two loops of one direction, rate and amplitude, which repeat each other.
-
-    Returns:
-        True for a pattern.
-    """
-    if sum(part.family == "frequency" for part in faulty_parts) > 1 or any(
-        part.may_be_physics for part in faulty_parts
-    ):
-        return True
-    loops = [(part.direction, *part.frequency, *part.amplitude) for part in faulty_parts if part.family == "loop"]
-    return any(
-        first[0] == second[0] and np.allclose(first[1:], second[1:], rtol=SAME_LOOP, atol=0.0)
-        for first, second in combinations(loops, 2)
-    )
-
-
-def outlier_clusters(
-    outliers: Sequence[Outlier], sweeps: Sequence[MeasuredSweep], model: Model
-) -> list[OutlierCluster]:
-    """Find frequencies with several outliers, which suggest a disturbance rather than single wrong rows.
-
-    Args:
-        outliers: points that were left out.
-        sweeps: the sweeps as they were read.
-        model: the fitted model.
-
-    Returns:
-        One explanation for each frequency with two or more outliers.
-
-    Notes:
-        Single wrong rows may coincide by chance. For n such rows, the probability of k at the frequency of one of them
-        is that of k - 1 or more among the other n - 1 (binomial, with p = 1 / number of frequencies).
-    """
-    distances = {(outlier.test, outlier.row): outlier.distance for outlier in outliers}
-    points_by_frequency: dict[float, list[tuple[MeasuredSweep, int, float]]] = defaultdict(list)
-    for sweep in sweeps:
-        for point, (frequency, row) in enumerate(zip(sweep.frequency.tolist(), sweep.order.tolist(), strict=True)):
-            points = points_by_frequency[frequency]
-            if (sweep.name, row + 1) in distances:
-                points.append((sweep, point, distances[sweep.name, row + 1]))
-    found = []
-    for frequency, points in points_by_frequency.items():
-        if len(points) < 2:
-            continue
-        chance = float(bdtrc(len(points) - 2, len(outliers) - 1, 1.0 / len(points_by_frequency)))
-        directions = dict.fromkeys(str(sweep.direction) for sweep, *_ in points)
-        location = "several directions" if len(directions) > 1 else next(iter(directions))
-        amplitudes = [float(sweep.amplitude[point]) for sweep, point, _ in points]
-        found.append(
-            OutlierCluster(
-                "part",
-                "frequency",
-                f"{frequency:.4g} Hz in {location} ({len(points)} points left out)",
-                None,
-                points[0][0].direction,
-                (frequency, frequency),
-                (min(amplitudes), max(amplitudes)),
-                float(np.sqrt(np.mean(np.square([distance for *_, distance in points])))),
-                max(float(np.linalg.norm(sweep.relative_difference(model)[:, point])) for sweep, point, _ in points),
-                -log(max(chance, np.finfo(float).tiny)),
-            )
-        )
-    return found
-
-
-def compound(evidence: Evidence, count: int = _COMPOUND_PATTERNS, *, fast: bool = False) -> Group | None:
-    """Changes of the residuals if the modulus of the compound deviates smoothly from the model's laws.
-
-    The relative deviation is a random function of frequency and strain, the same in all directions and specimens.
-
-    Args:
-        evidence: fitted model and tests.
-        count: maximum number of patterns.
-        fast: True to include relaxation faster than the tests, which differs little from a delay.
-
-    Returns:
-        Group of independent patterns of the deviation, of unit variance at each operating point, and of deviations of
-        the shape of each loop; None without tests.
-    """
-    if not evidence.data_sets:
-        return None
-    limits = {"count": count, "correlate": _compound_correlation}
-    columns, changes = _smooth_changes(evidence, evidence.data_sets, COMPOUND_LENGTHS, **limits)
-    parts = [(columns, changes), _strain_changes(evidence), *([_fast_relaxation(evidence)] if fast else [])]
-    columns, changes = map(np.concatenate, zip(*parts, strict=True))
-    for loops in group_repeats(split_by_kind(evidence.data_sets)[0]):
-        columns = np.concatenate((columns, _repeat_changes(evidence, loops, compound_shapes)))
-    unit = np.zeros((len(columns), changes.shape[-1]), dtype=complex)
-    unit[: len(changes)] = changes
-    return Group(columns, unit, act_together=True)
-
-
-def _strain_changes(evidence: Evidence) -> tuple[Array, Array]:
-    """Changes due to an error of the effective strain in each direction or specimen, in the form of `_smooth_changes`.
-
-    Returns:
-        Changes of the n whitened residuals, (d, n), and of the stiffness at all operating points, (d, points), due to
-        the errors of d directions. With a single direction d is 0, because its strain only rescales the compound's
-        parameters.
-    """
-    model, tests = evidence.model, evidence.data_sets
-    directions = list(dict.fromkeys(test.direction for test in tests))
-    directions = directions if len(directions) > 1 else []
-    columns, changes = np.zeros((len(directions), evidence.residual.size)), list[Array]()
-    for test in tests:
-        stiffness, nearby = (
-            model.stiffness(test.direction, test.frequency, scale * test.amplitude, kind=test.kind)
-            for scale in (1.0, 1.0 + _STRAIN_STEP)
-        )
-        acts = np.array([[direction == test.direction] for direction in directions]).reshape(-1, 1)
-        change = acts * _STRAIN_ERROR * (nearby / stiffness - 1.0) / _STRAIN_STEP
-        columns[:, evidence.residual_rows[test]] = test.residual_change(change * stiffness, model)
-        changes.append(change)
-    return columns, np.concatenate(changes, axis=-1)
-
-
-def _fast_relaxation(evidence: Evidence) -> tuple[Array, Array]:
-    """Changes due to a relaxation faster than the tests, in the form of `_smooth_changes`, with one amount.
-
-    Far below its own frequency, a relaxation is a loss modulus that grows as the frequency, like the phase of a delay.
-    The amount is relative to the median modulus |K|/(stiffness per modulus) at the highest frequency.
-    """
-    model, tests = evidence.model, evidence.data_sets
-    highest = max(float(test.frequency.max()) for test in tests)
-    factors = [stiffness_per_modulus(model.bushing, test.direction) for test in tests]
-    modulus = np.median(np.concatenate([np.abs(test.measured) / k for test, k in zip(tests, factors, strict=True)]))
-    columns, changes = np.zeros((1, evidence.residual.size)), list[Array]()
-    for test, factor in zip(tests, factors, strict=True):
-        change = _FAST_RELAXATION * 1j * modulus * factor * test.frequency[None] / highest
-        columns[:, evidence.residual_rows[test]] = test.residual_change(change, model)
-        changes.append(change / model.stiffness(test.direction, test.frequency, test.amplitude, kind=test.kind))
-    return columns, np.concatenate(changes, axis=-1)
-
-
-def _compound_correlation(points: Array, nodes: Array) -> Array:
-    """Correlation of the compound's deviation between n points, (n, 2), and m nodes, (m, 2), as a matrix (n, m).
-
-    The columns are ln frequency and ln strain in units of the correlation lengths.
-
-    >>> _compound_correlation(np.zeros((1, 2)), np.array([[0.0, 0.0], [0.0, 0.4]])).round(3)
-    array([[1.   , 0.862]])
-    """
-    ratio, share = np.divide(COMPOUND_LENGTHS, _CURVE_LENGTHS["smooth"]), _COMPOUND_ROUGHNESS**2
-    return (matern(points, nodes) + share * matern(points * ratio, nodes * ratio)) / (1.0 + share)
-
-
-def compound_shapes(loop: MeasuredLoop) -> Array:
-    """Changes of the shape of a loop if the stiffness of the compound deviates from the model's laws by 100 %.
-
-    Returns:
-        Changes of the loop's n whitened residuals for c independent deviations, one standard deviation each, (c, n).
-
-    Notes:
-        An isotropic compound is symmetric, so a steady cycle has odd overtones only. The h-th falls as 1/h^2, because
-        the force is continuous with kinks where the motion turns back. The first cycle from rest may deviate in
-        addition by as much as a third overtone without this decrease.
-    """
-    if loop.fundamental_only:
-        return np.empty((0, loop.size))
-    phase, order = loop.prepared.phase, np.arange(3, _LAST_OVERTONE + 1, 2)[:, None]
-    angle = 2.0 * np.pi * order * phase
-    waves = np.concatenate([np.cos(angle) / order**2, np.sin(angle) / order**2])
-    if loop.prepared.from_rest:
-        order = np.arange(_TRANSIENT_WAVES)[:, None]
-        first = np.cos(np.pi * order * phase) * (phase < 1.0)
-        waves = np.concatenate([waves, first / (3.0 * (1.0 + order))])
-    return loop.force_changes(waves)
-
-
-def unnamed_curves(evidence: Evidence) -> list[Explanation]:
-    """List smooth curves over frequency and strain that can explain a gap for which the library has no effect.
-
-    A curve is a smooth complex relative change of the stiffness that all sweeps of one direction and temperature share.
-
-    Args:
-        evidence: the fitted model and the tests.
-
-    Returns:
-        A smooth and a rough curve (Gaussian process) for each direction, a rough one for all directions together, and
-        one explanation for the harmonics of all loops.
-    """
-    loops, sweeps = split_by_kind(evidence.data_sets)
-    groups: dict[str, Group] = {}
-    levels: dict[tuple[str, Hashable], list[MeasuredSweep]] = defaultdict(list)  # by direction and temperature
-    for sweep in sweeps:
-        kelvin = sweep.sweep.temperature
-        level = None if kelvin is None else round(float(np.mean(kelvin)) / SAME_TEMPERATURE)
-        levels[str(sweep.direction), level].append(sweep)
-    directions: dict[str, list[tuple[Array, Array]]] = defaultdict(list)  # masks of residuals and of operating points
-    for (direction, _), chosen in levels.items():
-        rows = np.zeros(evidence.residual.size, dtype=bool)
-        for sweep in chosen:
-            rows[evidence.residual_rows[sweep]] = True
-        points = np.concatenate([np.full(sweep.frequency.size, sweep in chosen) for sweep in sweeps])
-        directions[direction].append((rows, points))
-    for roughness, lengths in _CURVE_LENGTHS.items() if sweeps else ():
-        columns, changes = _smooth_changes(evidence, sweeps, lengths, **_CURVE_PATTERNS)
-        for direction, masks in directions.items():
-            groups[f"{roughness} {direction}"] = Group(
-                np.concatenate([columns * rows for rows, _ in masks]),
-                np.concatenate([changes * points for _, points in masks]),
-                act_together=True,
-            )
-        if roughness == "rough" and len(directions) > 1:  # a smooth curve in all directions is the compound's
-            groups["rough all"] = Group(columns, changes, act_together=True)
-    if loops:
-        repeats = group_repeats(loops)
-        shapes = block_diag(*[basis(np.arange(_PHASES) / _PHASES, SMOOTH_HARMONICS).T] * len(repeats))
-        columns = np.concatenate([_repeat_changes(evidence, group, MeasuredLoop.smooth_changes) for group in repeats])
-        groups["loops"] = Group(columns, shapes, act_together=True)
-    return [Explanation("unnamed", "unnamed", name, group) for name, group in groups.items()]
-
-
-def _smooth_changes(
-    evidence: Evidence, tests: Sequence[MeasuredTest], lengths: tuple[float, float], **limits: Any
-) -> tuple[Array, Array]:
-    """Patterns of a smooth relative change of the stiffness: a Gaussian process of unit variance over operating points.
-
-    Args:
-        evidence: fitted model and all tests.
-        tests: tests in which the stiffness changes.
-        lengths: correlation lengths in ln frequency and ln strain.
-        limits: limits of the number of patterns, passed to `gaussian_process.patterns`.
-
-    Returns:
-        Changes of the n whitened residuals due to q independent patterns in phase and in quadrature, (2 q, n), and the
-        complex relative changes of stiffness of these patterns at the points of `tests`, (2 q, points).
-    """
-    model = evidence.model
-    points = [coordinates(test.frequency, test.amplitude * model.unit_strain(test.direction)) for test in tests]
-    _, shapes = patterns(in_lengths(np.concatenate(points), lengths), **limits)
-    changes = (shapes[:, None] * np.array([[1.0], [1.0j]])).reshape(-1, shapes.shape[-1])
-    columns = np.zeros((len(changes), evidence.residual.size))
-    for test, change in zip(tests, np.split(changes, np.cumsum([*map(len, points)])[:-1], axis=1), strict=True):
-        stiffness = model.stiffness(test.direction, test.frequency, test.amplitude, kind=test.kind)
-        columns[:, evidence.residual_rows[test]] = test.residual_change(change * stiffness, model)
-    return columns, changes
-
-
-def _repeat_changes(
-    evidence: Evidence, loops: Sequence[MeasuredLoop], changes: Callable[[MeasuredLoop], Array]
-) -> Array:
-    """Changes of all n residuals due to force errors that repeats of a loop share.
-
-    Args:
-        evidence: fitted model and all tests.
-        loops: repeats of a loop.
-        changes: function that returns the changes of a loop's m residuals due to c force errors of unit amount, (c, m).
-
-    Returns:
-        Changes of the residuals of all tests, (c, n).
-    """
-    by_loop = [changes(loop) for loop in loops]
-    columns = np.zeros((len(by_loop[0]), evidence.residual.size))
-    for loop, of_loop in zip(loops, by_loop, strict=True):
-        columns[:, evidence.residual_rows[loop]] = of_loop
-    return columns

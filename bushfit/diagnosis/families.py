@@ -5,13 +5,13 @@ A family is a choice of effects for rate and for amplitude; each is fitted to al
 
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext, suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
 from scipy.special import logsumexp, ndtr
 
-from bushfit.diagnosis.evidence import Evidence, fit
+from bushfit.diagnosis.fits import fit_model
 from bushfit.diagnosis.holdout import HoldOut, Predicted, hold_out_parts, predicted_parts
 from bushfit.diagnosis.laplace import laplace
 from bushfit.effects import BASE, get_effect
@@ -21,6 +21,7 @@ from bushfit.fitting.coordinates import Bounds
 from bushfit.fitting.design import with_effect
 from bushfit.fitting.model_error import log_likelihood, with_model_error
 from bushfit.fitting.preparation import MeasuredTest
+from bushfit.fitting.problem import FitResult
 from bushfit.model.covariance import Z95
 from bushfit.model.model import Model
 from bushfit.prediction.comparison import CHANCE
@@ -47,7 +48,7 @@ class FittedFamily:
     Args:
         name: effects that the family adds or puts in place of branches, joined by +; for the first family, "paper" and
             its other effects.
-        evidence: the fitted model and the tests.
+        fit: the fitted model and the tests.
         holdout: root mean square of the residuals of the held-out tests, in units of the noise: `before` for the first
             family, `after` for this family.
         gain: reduction of the held-out mean square relative to the first family, in squared units of noise, with the
@@ -59,12 +60,18 @@ class FittedFamily:
     """
 
     name: str
-    evidence: Evidence
+    fit: FitResult
     holdout: HoldOut
     gain: tuple[float, float, float] | None = None
     p: float | None = None
     log_evidence: float = 0.0
     probability: float = 1.0
+
+    @property
+    def bic(self) -> float:
+        """Bayesian information criterion: chi-square + parameters ln n, n independent points; lower is better."""
+        independent = sum(data_set.independent_count for data_set in self.fit.data_sets)
+        return self.fit.chi_square + len(self.fit.names) * float(np.log(independent))
 
     @property
     def words(self) -> str:
@@ -132,7 +139,7 @@ def fit_families(
         FitError: data that cannot support the fit of a family that is named.
         ModelError: an unknown effect, one that the model has already, or one that replaces a missing branch.
     """
-    first = fit(model, data_sets, fixed, bounds)
+    first = fit_model(model, data_sets, fixed, bounds)
     base_name = "+".join(["paper", *(name for name in model.effects if name not in BASE)])
     chains = {base_name: [first]}
     requested = names or known_families(model, data_sets)
@@ -155,8 +162,8 @@ def fit_families(
 
 
 def _chain(
-    chains: Mapping[str, list[Evidence]], first: Evidence, name: str, fixed: Sequence[str], bounds: Bounds
-) -> list[Evidence]:
+    chains: Mapping[str, list[FitResult]], first: FitResult, name: str, fixed: Sequence[str], bounds: Bounds
+) -> list[FitResult]:
     """Fit a model family effect by effect, starting from the fits of the family without its last effect.
 
     Args:
@@ -177,11 +184,10 @@ def _chain(
         problem = has if last in present else "the effect that this effect replaces is not in the model"
         laws = " or ".join(name for name in (*_RATE, *_AMPLITUDE) if _can_add(chain[-1].model, name))
         raise ModelError(problem, found=last, expected=f"such as {laws}")
-    solution = with_effect(chain[-1].solution, chain[-1].data_sets, effect, fixed, bounds)
-    return [*chain, Evidence(solution)]
+    return [*chain, with_effect(chain[-1], chain[-1].data_sets, effect, fixed, bounds)]
 
 
-def _log_evidence(chain: Sequence[Evidence], names: Sequence[str], bounds: Bounds) -> float:
+def _log_evidence(chain: Sequence[FitResult], names: Sequence[str], bounds: Bounds) -> float:
     """Natural log of the marginal likelihood of the tests under a model family.
 
     Args:
@@ -190,8 +196,8 @@ def _log_evidence(chain: Sequence[Evidence], names: Sequence[str], bounds: Bound
         bounds: limits of parameters inside their general limits.
     """
     *before, last = chain
-    found = with_model_error(last.solution, bounds)[0]
-    priors = [laplace(name, replace(last, solution=found), one) for name, one in zip(names, before, strict=True)]
+    found = with_model_error(last, bounds)[0]
+    priors = [laplace(name, found, one) for name, one in zip(names, before, strict=True)]
     precisions = {name: value for _, precision, _ in priors for name, value in precision.items()}
     return sum(density for density, *_ in priors) + log_likelihood(found, precisions)
 

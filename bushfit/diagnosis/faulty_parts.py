@@ -4,19 +4,28 @@ A level is the set of all points of a sweep at one constant amplitude, or at one
 of gain and phase that all points of the part have in common; levels and repeats also have a slope of both.
 """
 
+from __future__ import annotations
+
+from collections import defaultdict
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
-from itertools import groupby
+from dataclasses import dataclass, field, replace
+from itertools import combinations, groupby
+from math import log
 
 import numpy as np
+from scipy.special import bdtrc
 
-from bushfit.diagnosis.evidence import Evidence
-from bushfit.diagnosis.explanations import FaultyPart
-from bushfit.diagnosis.groups import Group
+from bushfit.diagnosis.explanations import Explanation, Group
+from bushfit.diagnosis.record import MisfitRegion
 from bushfit.effects.contract import Array
 from bushfit.fitting.measured_test import shown_amplitude
-from bushfit.fitting.preparation import MeasuredSweep, split_by_kind
+from bushfit.fitting.preparation import SAME_LOOP, MeasuredSweep, split_by_kind
+from bushfit.fitting.problem import FitResult
+from bushfit.geometry import Place
+from bushfit.model.model import Model
+from bushfit.model.result import Outlier
 from bushfit.reading.preload import add_preload
+from bushfit.units import number
 
 #: Maximum number of neighbouring frequencies that one disturbance covers: mains hum and its sidebands.
 _WIDEST = 3
@@ -30,29 +39,177 @@ _FEWEST_FREQUENCIES = 5
 _MOST_FREQUENCIES = 100
 
 
-def find_faulty_parts(evidence: Evidence) -> list[FaultyPart]:
+@dataclass(frozen=True, eq=False)
+class FaultyPart(Explanation):
+    """Explanation of a gap by a fault of the tests: a frequency, level, repeat or loop whose points deviate together.
+
+    A level is the set of all points of a sweep at one constant amplitude, or at one constant frequency.
+
+    Args:
+        direction: direction or specimen of the first test.
+        frequency: lowest and highest frequency of the faulty points [Hz].
+        amplitude: their smallest and largest amplitude, zero-to-peak [m or rad].
+        may_be_physics: True if an effect that the model lacks could change the same points, and not a wrong test: the
+            smallest or largest level of a direction, a loop that no other test covers, or frequencies in all directions
+            at every amplitude.
+    """
+
+    direction: Place
+    frequency: tuple[float, float]
+    amplitude: tuple[float, float]
+    may_be_physics: bool = field(default=False, kw_only=True)
+
+    @property
+    def columns(self) -> Array:
+        """Changes of the n whitened residuals per unit of c errors: gain, phase [rad] and their slopes, (c, n)."""
+        assert self.group is not None
+        return self.group.whole
+
+    def point_by_point(self) -> FaultyPart:
+        """Fault of the same sweep points, each with an independent error in place of a common shift or slope.
+
+        Returns:
+            Faulty part with one column for each residual of its points.
+        """
+        size = np.abs(self.columns).max(axis=0)
+        rows = np.flatnonzero(size)
+        columns = np.zeros((rows.size, size.size))
+        columns[np.arange(rows.size), rows] = size[rows]
+        return replace(self, group=Group(columns, np.eye(rows.size), act_together=True))
+
+    def region(self, residual: Array, change: float) -> MisfitRegion:
+        """Region of disagreement that this faulty part is.
+
+        Args:
+            residual: whitened residuals of all tests, (n,).
+            change: deviation of the part from all other tests, relative to |K|.
+        """
+        kind, component = ("loop", "force") if self.family == "loop" else ("sweep", "storage")
+        reading = f"{self.name}: a deviation of {number(100 * change, 2)} % from all other tests"
+        excess = self.distance(residual)
+        return MisfitRegion(self.direction, kind, self.frequency, self.amplitude, component, excess, reading)
+
+    def distance(self, residual: Array) -> float:
+        """Root mean square deviation of this part's points from the model, in units of noise.
+
+        Args:
+            residual: whitened residuals of all tests, (n,).
+        """
+        columns = self.columns
+        amounts = columns @ residual / np.maximum(np.linalg.norm(columns, axis=1), 1e-300)
+        return float(np.sqrt(np.mean(amounts**2)))
+
+
+@dataclass(frozen=True, eq=False)
+class OutlierCluster(FaultyPart):
+    """Explanation of several outliers at one frequency, all left out of the fit, by a disturbance at that frequency.
+
+    Args:
+        outlier_distance: root mean square distance of the outliers from the model, in units of noise.
+        size: largest distance of a point from the model, |K_model - K_measured|/|K_measured|.
+        log_odds: natural log of the odds of a disturbance against a chance coincidence of single wrong rows.
+    """
+
+    outlier_distance: float
+    size: float
+    log_odds: float
+
+    def distance(self, residual: Array) -> float:  # noqa: ARG002
+        return self.outlier_distance
+
+
+def is_pattern(faulty_parts: Sequence[FaultyPart]) -> bool:
+    """True if suspected faults of the tests form a pattern, which may be an effect that the model lacks.
+
+    Patterns are faults at several frequencies, as by a resonance, or at frequencies of all directions; at the smallest
+    or largest level, as by a contact; or of two loops of one direction, rate and amplitude, which repeat each other.
+
+    Returns:
+        True for a pattern.
+    """
+    if sum(part.family == "frequency" for part in faulty_parts) > 1 or any(
+        part.may_be_physics for part in faulty_parts
+    ):
+        return True
+    loops = [(part.direction, *part.frequency, *part.amplitude) for part in faulty_parts if part.family == "loop"]
+    return any(
+        first[0] == second[0] and np.allclose(first[1:], second[1:], rtol=SAME_LOOP, atol=0.0)
+        for first, second in combinations(loops, 2)
+    )
+
+
+def outlier_clusters(
+    outliers: Sequence[Outlier], sweeps: Sequence[MeasuredSweep], model: Model
+) -> list[OutlierCluster]:
+    """Find frequencies with several outliers, which suggest a disturbance rather than single wrong rows.
+
+    Args:
+        outliers: points that were left out.
+        sweeps: the sweeps as they were read.
+        model: the fitted model.
+
+    Returns:
+        One explanation for each frequency with two or more outliers.
+
+    Notes:
+        Single wrong rows may coincide by chance. For n such rows, the probability of k at the frequency of one of them
+        is that of k - 1 or more among the other n - 1 (binomial, with p = 1 / number of frequencies).
+    """
+    distances = {(outlier.test, outlier.row): outlier.distance for outlier in outliers}
+    points_by_frequency: dict[float, list[tuple[MeasuredSweep, int, float]]] = defaultdict(list)
+    for sweep in sweeps:
+        for point, (frequency, row) in enumerate(zip(sweep.frequency.tolist(), sweep.order.tolist(), strict=True)):
+            points = points_by_frequency[frequency]
+            if (sweep.name, row + 1) in distances:
+                points.append((sweep, point, distances[sweep.name, row + 1]))
+    found = []
+    for frequency, points in points_by_frequency.items():
+        if len(points) < 2:
+            continue
+        chance = float(bdtrc(len(points) - 2, len(outliers) - 1, 1.0 / len(points_by_frequency)))
+        directions = dict.fromkeys(str(sweep.direction) for sweep, *_ in points)
+        location = "several directions" if len(directions) > 1 else next(iter(directions))
+        amplitudes = [float(sweep.amplitude[point]) for sweep, point, _ in points]
+        found.append(
+            OutlierCluster(
+                "part",
+                "frequency",
+                f"{frequency:.4g} Hz in {location} ({len(points)} points left out)",
+                None,
+                points[0][0].direction,
+                (frequency, frequency),
+                (min(amplitudes), max(amplitudes)),
+                float(np.sqrt(np.mean(np.square([distance for *_, distance in points])))),
+                max(float(np.linalg.norm(sweep.relative_difference(model)[:, point])) for sweep, point, _ in points),
+                -log(max(chance, np.finfo(float).tiny)),
+            )
+        )
+    return found
+
+
+def find_faulty_parts(fit: FitResult) -> list[FaultyPart]:
     """List the parts of the tests that may be faulty, as explanations of a gap.
 
     Args:
-        evidence: the fitted model and the tests.
+        fit: the fitted model and the tests.
 
     Returns:
         Frequencies, levels, repeats and, if there are sweeps too, loops.
     """
-    loops, sweeps = split_by_kind(evidence.data_sets)
-    faulty_parts = [*_frequencies(evidence, sweeps), *_levels(evidence, sweeps), *_repeats(evidence, sweeps)]
+    loops, sweeps = split_by_kind(fit.data_sets)
+    faulty_parts = [*_frequencies(fit, sweeps), *_levels(fit, sweeps), *_repeats(fit, sweeps)]
     for loop in loops if sweeps else ():  # wrong as a whole, in gain or offset
         group = Group(
             np.array(loop.gain_and_offset()),
             np.eye(2),
             act_together=True,
-            covered_rows=(evidence.residual_rows[loop], evidence.residual.size),
+            covered_rows=(fit.residual_rows[loop], fit.residual.size),
         )
         frequency, amplitude = loop.prepared.frequency, loop.prepared.amplitude
         is_covered = any(
             test.frequency.min() / _SAME <= frequency <= test.frequency.max() * _SAME
             and test.amplitude.min() / _SAME <= amplitude <= test.amplitude.max() * _SAME
-            for test in evidence.data_sets
+            for test in fit.data_sets
             if test is not loop and test.direction == loop.direction
         )
         ends, name = ((frequency,) * 2, (amplitude,) * 2), f"the loop {loop.name}"
@@ -70,7 +227,7 @@ def _level_label(sweep: MeasuredSweep, point: int) -> str:
     return f"run {sweep.repeat[point]} of {sweep.name}, {sweep.direction}"
 
 
-def _levels(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> Iterator[FaultyPart]:
+def _levels(fit: FitResult, sweeps: Sequence[MeasuredSweep]) -> Iterator[FaultyPart]:
     """Generate suspected faults: each level, if there are several, and each repeat of a level with three or more."""
     for sweep in sweeps:
         levels_of_direction = [np.unique(member.held_value) for member in sweeps if member.direction == sweep.direction]
@@ -79,26 +236,26 @@ def _levels(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> Iterator[Fau
             mask = sweep.held_value == level
             label = add_preload(_level_label(sweep, int(np.argmax(mask))), sweep.sweep.preload, sweep.direction)
             if levels.size > 1:  # in this file or in others
-                part = _common_fault(evidence, "level", label, [sweep], [mask])
+                part = _common_fault(fit, "level", label, [sweep], [mask])
                 yield replace(part, may_be_physics=levels.size > 2 and level in (levels.min(), levels.max()))
             numbers = np.unique(sweep.repeat[mask])
-            for number in numbers if numbers.size > 2 else ():
-                repeat = mask & (sweep.repeat == number)
-                yield _common_fault(evidence, "repeat", f"repeat {number} of {label}", [sweep], [repeat])
+            for repeat in numbers if numbers.size > 2 else ():
+                points = mask & (sweep.repeat == repeat)
+                yield _common_fault(fit, "repeat", f"repeat {repeat} of {label}", [sweep], [points])
 
 
-def _repeats(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> Iterator[FaultyPart]:
+def _repeats(fit: FitResult, sweeps: Sequence[MeasuredSweep]) -> Iterator[FaultyPart]:
     """Generate suspected faults: each repeat, in one sweep, in all sweeps of a direction, or in all sweeps."""
     for _, label, members in _scopes(sweeps):
         if not all(np.unique(sweep.repeat).size > 1 for sweep in members):
             continue
-        for number in sorted({int(repeat) for sweep in members for repeat in sweep.repeat}):
-            chosen = [sweep.repeat == number for sweep in members]
+        for repeat in sorted({int(repeat) for sweep in members for repeat in sweep.repeat}):
+            chosen = [sweep.repeat == repeat for sweep in members]
             if all(mask.any() for mask in chosen):
-                yield _common_fault(evidence, "repeat", f"repeat {number} of {label}", members, chosen)
+                yield _common_fault(fit, "repeat", f"repeat {repeat} of {label}", members, chosen)
 
 
-def _frequencies(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> Iterator[FaultyPart]:
+def _frequencies(fit: FitResult, sweeps: Sequence[MeasuredSweep]) -> Iterator[FaultyPart]:
     """Generate suspected faults: one to three frequencies, in one sweep, all sweeps of a direction, or all sweeps."""
     steps = np.unique(np.concatenate([sweep.frequency for sweep in sweeps])) if sweeps else np.empty(0)
     if steps.size < _FEWEST_FREQUENCIES:
@@ -106,7 +263,7 @@ def _frequencies(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> Iterato
     bands = [part[[0, -1]].tolist() for part in np.array_split(steps, min(steps.size, _MOST_FREQUENCIES))]
     for location, _, members in _scopes(sweeps):
         masks = [[(low <= sweep.frequency) & (sweep.frequency <= high) for sweep in members] for low, high in bands]
-        columns = [_shift_columns(evidence, members, chosen) for chosen in masks]
+        columns = [_shift_columns(fit, members, chosen) for chosen in masks]
         for width in range(1, _WIDEST + 1):
             for first in range(len(bands) - width + 1):
                 window = slice(first, first + width)
@@ -116,9 +273,7 @@ def _frequencies(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> Iterato
                 name = f"{' to '.join(f'{end:.4g}' for end in ends)} Hz in {location}, at every amplitude"
                 chosen = [np.any(of_sweep, axis=0) for of_sweep in zip(*masks[window], strict=True)]
                 unit = np.kron(np.eye(width), np.array([[1.0], [1.0j]]))
-                part = _common_fault(
-                    evidence, "frequency", name, members, chosen, np.concatenate(columns[window]), unit
-                )
+                part = _common_fault(fit, "frequency", name, members, chosen, np.concatenate(columns[window]), unit)
                 yield replace(part, may_be_physics=len({sweep.direction for sweep in members}) > 1)
 
 
@@ -145,7 +300,7 @@ def _scopes(sweeps: Sequence[MeasuredSweep]) -> Iterator[tuple[str, str, Sequenc
 
 
 def _common_fault(
-    evidence: Evidence,
+    fit: FitResult,
     family: str,
     name: str,
     sweeps: Sequence[MeasuredSweep],
@@ -156,7 +311,7 @@ def _common_fault(
     """Explanation of a gap by errors that some sweep points share: of gain and phase, and of their slopes.
 
     Args:
-        evidence: the fitted model and the tests.
+        fit: the fitted model and the tests.
         family: kind of the fault, such as "level" or "repeat".
         name: name of the fault for reports.
         sweeps: sweeps that have the fault.
@@ -165,23 +320,23 @@ def _common_fault(
             phase and their slopes.
         unit: complex relative change of the stiffness per unit of each error at p points of the part, (c, p).
     """
-    columns = _shift_columns(evidence, sweeps, chosen, sloping=True) if columns is None else columns
+    columns = _shift_columns(fit, sweeps, chosen, sloping=True) if columns is None else columns
     frequency, amplitude = (
         np.concatenate([getattr(sweep, axis)[mask] for sweep, mask in zip(sweeps, chosen, strict=True)])
         for axis in ("frequency", "amplitude")
     )
     ends = (float(frequency.min()), float(frequency.max())), (float(amplitude.min()), float(amplitude.max()))
-    group = Group(columns, unit, act_together=True, covered_rows=(_row_span(evidence, sweeps), evidence.residual.size))
+    group = Group(columns, unit, act_together=True, covered_rows=(_row_span(fit, sweeps), fit.residual.size))
     return FaultyPart("part", family, name, group, sweeps[0].direction, *ends)
 
 
 def _shift_columns(
-    evidence: Evidence, sweeps: Sequence[MeasuredSweep], chosen: Sequence[Array], sloping: bool = False
+    fit: FitResult, sweeps: Sequence[MeasuredSweep], chosen: Sequence[Array], sloping: bool = False
 ) -> Array:
     """Change of the whitened residuals of sweeps due to a gain error of 100 % and a phase error of 1 rad.
 
     Args:
-        evidence: the fitted model and the tests.
+        fit: the fitted model and the tests.
         sweeps: sweeps with the errors.
         chosen: mask of the points with the errors in each sweep, (n,) each.
         sloping: True to add the same errors times a slope along the log of the stepped quantity.
@@ -190,20 +345,20 @@ def _shift_columns(
         Changes of the residuals of all rows from the first to the last of `sweeps`, (2, rows), or (4, rows) with
         slopes.
     """
-    rows = _row_span(evidence, sweeps)
+    rows = _row_span(fit, sweeps)
     columns = np.zeros((2 + 2 * sloping, rows.stop - rows.start))
     for sweep, mask in zip(sweeps, chosen, strict=True):
         log_step = np.log(sweep.step)
         slope = 2.0 * (log_step - log_step.mean()) / max(float(np.ptp(log_step)), 1e-9)
         shapes = [mask.astype(float), *([mask * slope] if sloping else [])]
-        sweep_rows = evidence.residual_rows[sweep]
+        sweep_rows = fit.residual_rows[sweep]
         columns[:, sweep_rows.start - rows.start : sweep_rows.stop - rows.start] = [
             column for shape in shapes for column in sweep.shared_error_columns(shape)
         ]
     return columns
 
 
-def _row_span(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> slice:
+def _row_span(fit: FitResult, sweeps: Sequence[MeasuredSweep]) -> slice:
     """Slice of the residual vector from the first to the last row of the given sweeps."""
-    slices = [evidence.residual_rows[sweep] for sweep in sweeps]
+    slices = [fit.residual_rows[sweep] for sweep in sweeps]
     return slice(min(rows.start for rows in slices), max(rows.stop for rows in slices))

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bushfit.diagnosis.evidence import Evidence, fit
+from bushfit.diagnosis.fits import fit_model
 from bushfit.effects import effect_name_of
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError, ModelError
@@ -140,7 +140,7 @@ class HoldOut:
         return cls(tuple(HeldOut(name, *values) for name, values in figures.items()), tuple(skipped), *overall)
 
 
-def hold_out(before: Evidence, after: Evidence, bounds: Bounds) -> HoldOut:
+def hold_out(before: FitResult, after: FitResult, bounds: Bounds) -> HoldOut:
     """Compare the residuals of two models on each part of the tests, predicted by fits to the other parts.
 
     Args:
@@ -155,7 +155,7 @@ def hold_out(before: Evidence, after: Evidence, bounds: Bounds) -> HoldOut:
     return HoldOut.from_residuals({name: prediction.residuals for name, prediction in predictions.items()}, skipped)
 
 
-def predicted_parts(before: Evidence, after: Evidence, bounds: Bounds) -> tuple[dict[str, Predicted], list[Skipped]]:
+def predicted_parts(before: FitResult, after: FitResult, bounds: Bounds) -> tuple[dict[str, Predicted], list[Skipped]]:
     """Predict each part of the tests from the other parts, by a model without and a model with added effects.
 
     Args:
@@ -166,7 +166,7 @@ def predicted_parts(before: Evidence, after: Evidence, bounds: Bounds) -> tuple[
     Returns:
         Predictions by the name of the part, and the parts that at least one model cannot predict.
     """
-    models = [(evidence, _leave_out(evidence.solution)) for evidence in dict.fromkeys((before, after))]
+    models = [(fit, _leave_out(fit)) for fit in dict.fromkeys((before, after))]
     predictions, skipped = dict[str, Predicted](), list[Skipped]()
     for part in track("parts held out", hold_out_parts(after.data_sets)):
         attempts = [_predict(*model, part, bounds) for model in models]
@@ -205,18 +205,16 @@ class Predicted(NamedTuple):
     noise_gradients: Array
 
 
-def _leave_out(solution: FitResult) -> LeaveOut:
+def _leave_out(fit: FitResult) -> LeaveOut:
     """Linearise a fit, to predict it without some rows; parameters at a bound are fixed."""
-    return LeaveOut.from_fit(solution.jacobian[solution.moving], solution.residual)
+    return LeaveOut.from_fit(fit.jacobian[fit.moving], fit.residual)
 
 
-def _predict(
-    evidence: Evidence, leave_out: LeaveOut, part: HoldOutPart, bounds: Bounds
-) -> tuple[Array, Array] | Skipped:
+def _predict(fit: FitResult, leave_out: LeaveOut, part: HoldOutPart, bounds: Bounds) -> tuple[Array, Array] | Skipped:
     """Predict a part of the tests from the other parts by one model, with a refit if a Gauss-Newton step is too long.
 
     Args:
-        evidence: fit to all tests.
+        fit: fit to all tests.
         leave_out: linearisation of this fit, which predicts residuals without some rows.
         part: part that is held out.
         bounds: limits of parameters, for a fit to the remaining tests.
@@ -226,18 +224,17 @@ def _predict(
         sum of squares in units of noise with respect to the noise of each of the m residuals of all tests, (m,); or the
         part with the reason why it is skipped.
     """
-    solution, data_sets = evidence.solution, evidence.data_sets
-    names, of_tests = solution.coordinates.names, part.rows(data_sets)
-    rows = np.pad(of_tests, (0, solution.residual.size - of_tests.size))  # priors are not held out
-    if undetermined := [names[solution.moving[i]] for i in np.flatnonzero(leave_out.undetermined(rows))]:
+    names, data_sets = fit.names, fit.data_sets
+    of_tests = part.rows(data_sets)
+    rows = np.pad(of_tests, (0, fit.residual.size - of_tests.size))  # priors are not held out
+    if undetermined := [names[fit.moving[i]] for i in np.flatnonzero(leave_out.undetermined(rows))]:
         reason = f"the other tests do not determine {', '.join(undetermined)}"
         return Skipped(part.name, reason, tuple(dict.fromkeys(map(effect_name_of, undetermined))))
     is_step = leave_out.step(rows) is not None
     if not is_step:
-        fixed = [name for name in evidence.model.parameters if name not in names]
         failed = Skipped(part.name, "no fit to the other tests converges")
         try:
-            rest = fit(evidence.model, part.rest(data_sets), fixed, bounds).solution
+            rest = fit_model(fit.model, part.rest(data_sets), fit.fixed, bounds)
         except (FitError, ModelError):
             return failed
         leave_out = _leave_out(rest.reevaluate(rest.model, data_sets))

@@ -2,26 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 
 from bushfit.diagnosis.claims import Claim
-from bushfit.diagnosis.evidence import Evidence
-from bushfit.diagnosis.explanations import COMPOUND, Explanation, FaultyPart, OutlierCluster, compound
-from bushfit.diagnosis.groups import GroupEvidence
+from bushfit.diagnosis.explanations import Explanation
+from bushfit.diagnosis.faulty_parts import FaultyPart, OutlierCluster
 from bushfit.diagnosis.laplace import laplace
-from bushfit.diagnosis.linear_model import LinearModel
+from bushfit.diagnosis.linear_model import GroupEvidence, LinearModel
 from bushfit.diagnosis.priors import LEVELS
 from bushfit.diagnosis.propose import Proposal, proposals
-from bushfit.diagnosis.record import DiagnosisSettings
-from bushfit.diagnosis.recorded_tests import Tests
+from bushfit.diagnosis.recorded_tests import RecordedTests
 from bushfit.diagnosis.rig_errors import in_scatter_units
+from bushfit.diagnosis.smooth_deviations import COMPOUND, compound
 from bushfit.effects import get_effect, get_parameter, qualified_name
 from bushfit.effects.contract import Array
-from bushfit.fitting.prepared_campaign import PreparedCampaign
+from bushfit.fitting.problem import FitResult
 from bushfit.fitting.rig_class import ASSUMED, class_errors
 from bushfit.gaussian_process import MAXIMUM_NODES
 from bushfit.model.covariance import Covariance
@@ -29,27 +28,6 @@ from bushfit.model.covariance import Covariance
 #: Natural log of the odds below the best at which a noise case is left out; chosen for time: a case of relative weight
 #: e^-8 changes no verdict.
 _NEAR = 8.0
-
-
-@dataclass(frozen=True, eq=False)
-class DiagnosisRequest:
-    """Input of a search for explanations of the gap between model and tests.
-
-    Args:
-        data: campaign with the prepared tests.
-        base: starting model, fitted to the tests.
-        fit_corrected: function that fits the starting model to a campaign with a corrected record.
-        settings: limits of the diagnosis, and effects and mistakes not to consider.
-        start: starting values read from the data, by parameter, for a fit that the gap has distorted.
-        outlier_clusters: frequencies at which several outliers were left out.
-    """
-
-    data: PreparedCampaign
-    base: Evidence
-    fit_corrected: Callable[[PreparedCampaign], Evidence]
-    settings: DiagnosisSettings
-    start: Mapping[str, float]
-    outlier_clusters: Sequence[OutlierCluster]
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,8 +101,7 @@ class SearchState:
 
     Args:
         tests: tests with their record, as read or corrected.
-        evidence: fit of the model with the added effects.
-        bare: the same fit with residuals in units of the scatter from point to point, without shared errors.
+        fit: fit of the model with the added effects; faults and a deviation of the compound may be errors in it.
         log_prior: natural log of the prior probability of the set of explanations.
         effects: names of the effects that were added.
         faulty_parts: faulty parts of the tests, whose points may deviate together.
@@ -135,9 +112,8 @@ class SearchState:
         change: largest relative change of |K| due to the effects and faulty parts.
     """
 
-    tests: Tests
-    evidence: Evidence
-    bare: Evidence
+    tests: RecordedTests
+    fit: FitResult
     log_prior: float
     effects: tuple[str, ...] = ()
     faulty_parts: tuple[FaultyPart, ...] = ()
@@ -147,32 +123,41 @@ class SearchState:
     change: float = 0.0
 
     @classmethod
-    def of_tests(cls, tests: Tests) -> SearchState:
+    def of_tests(cls, tests: RecordedTests) -> SearchState:
         """Create the initial state of a search: the starting model with nothing added."""
-        return cls(tests, tests.base, tests.bare, tests.log_prior, change=tests.change)
+        return cls(tests, tests.base, tests.log_prior, change=tests.change)
 
-    def with_effect(self, name: str, evidence: Evidence, log_odds: float) -> SearchState:
+    def with_effect(self, name: str, fit: FitResult, log_odds: float) -> SearchState:
         """Add an effect to this step of the search.
 
         Args:
             name: name of the effect.
-            evidence: fit with the effect.
+            fit: fit with the effect.
             log_odds: natural log of the prior odds of the effect.
 
         Returns:
             State with the effect, the fit, and the prior of the effect's parameters.
         """
-        log_density, precision, change = laplace(name, evidence, self.evidence)
+        log_density, precision, change = laplace(name, fit, self.fit)
         return replace(
             self,
             effects=(*self.effects, name),
-            evidence=evidence,
-            bare=self.bare if evidence is self.evidence else in_scatter_units(evidence),
+            fit=fit,
             log_prior=self.log_prior + log_odds,
             precision={**self.precision, **precision},
             log_density=self.log_density + log_density,
             change=max(self.change, change),
         )
+
+    @cached_property
+    def bare(self) -> FitResult:
+        """The fit with residuals in units of the scatter from point to point, without errors that points share."""
+        return self.tests.bare if self.fit is self.tests.base else in_scatter_units(self.fit)
+
+    @cached_property
+    def plain(self) -> FitResult:
+        """The fit with residuals in units of noise, without faults and a deviation of the compound as errors."""
+        return self.fit.reevaluate(self.fit.model, self.fit.data_sets) if self.fit.problem.shared_error else self.fit
 
     @cached_property
     def key(self) -> frozenset[Hashable]:
@@ -182,13 +167,13 @@ class SearchState:
     @cached_property
     def linear(self) -> LinearModel:
         """Residuals linearised at the fit, from which the evidence is computed for each noise case of the rig."""
-        tests, solution = self.tests, self.bare.solution
-        precision = np.array([self.precision.get(name, 0.0) for name in solution.coordinates.names])
+        tests, bare = self.tests, self.bare
+        precision = np.array([self.precision.get(name, 0.0) for name in bare.names])
         moves = np.isfinite(precision)
         of_faulty_parts = [np.full(len(p.columns), x**-2) for p, x in zip(self.faulty_parts, self.amounts, strict=True)]
-        rows = np.concatenate([solution.jacobian[moves], *(part.columns for part in self.faulty_parts)])
+        rows = np.concatenate([bare.jacobian[moves], *(part.columns for part in self.faulty_parts)])
         precision = np.concatenate([precision[moves], *of_faulty_parts])
-        return LinearModel(self.bare.residual, rows, precision, tests.errors, compound=tests.compound)
+        return LinearModel(bare.residual, rows, precision, tests.errors, compound=tests.compound)
 
     @property
     def log_posterior(self) -> float:
@@ -205,11 +190,11 @@ class SearchState:
             would reward fits in which a parameter has no influence, such as mu near zero. If an effect replaces a
             branch, its best determined parameters count in place of those of the branch.
         """
-        solution, added = self.bare.solution, [get_effect(name) for name in self.effects]
+        added = [get_effect(name) for name in self.effects]
         replacing = {qualified_name(e, parameter) for e in added if e.replaces for parameter in e.parameters}
-        of_rubber = [name not in self.precision or name in replacing for name in solution.coordinates.names]
-        volume = np.linalg.svd(solution.jacobian[of_rubber], compute_uv=False)
-        count = len(self.tests.base.solution.coordinates.names)
+        of_rubber = [name not in self.precision or name in replacing for name in self.bare.names]
+        volume = np.linalg.svd(self.bare.jacobian[of_rubber], compute_uv=False)
+        count = len(self.tests.base.names)
         return self.log_prior + self.log_density + float(np.sum(np.log(np.maximum(volume[:count], 1e-12))))
 
     @property
@@ -244,18 +229,17 @@ class SearchState:
 
         The covariance includes errors of the rig and all patterns of a deviation of the compound.
         """
-        solution, values = self.bare.solution, self.bare.model.values
-        linear = replace(
-            self.linear, compound=compound(self.bare, MAXIMUM_NODES, fast=True), chosen_cases=self._likely_cases
-        )
-        moves = np.isfinite([self.precision.get(name, 0.0) for name in solution.coordinates.names])
-        slopes, count = solution.coordinates.slopes(values)[moves], np.count_nonzero(moves)
-        names = tuple(np.array(solution.coordinates.names)[moves].tolist())
+        bare, values = self.bare, self.bare.model.values
+        deviation = compound(bare, MAXIMUM_NODES, fast=True)
+        linear = replace(self.linear, compound=deviation, chosen_cases=self._likely_cases)
+        moves = np.isfinite([self.precision.get(name, 0.0) for name in bare.names])
+        slopes, count = bare.coordinates.slopes(values)[moves], np.count_nonzero(moves)
+        names = tuple(np.array(bare.names)[moves].tolist())
         mean, covariance = linear.parameters()
         steps = dict(zip(names, slopes * mean[:count], strict=True))
         means = {name: float(np.clip(values[name] + x, *get_parameter(name).bounds)) for name, x in steps.items()}
         fitted = Covariance(names, covariance[:count, :count] * np.outer(slopes, slopes))
-        return means, fitted.restricted([name for name in names if name not in solution.at_bound])
+        return means, fitted.restricted([name for name in names if name not in bare.at_bound])
 
     @property
     def may_grow(self) -> bool:
@@ -343,7 +327,7 @@ def mean_parameters(hypotheses: Sequence[Hypothesis], names: Sequence[str]) -> t
     weights = np.exp(log_posteriors[near] - log_posteriors.max())
     weights /= weights.sum()
     states = [hypotheses[n].state for n in near]
-    pairs = [({**state.evidence.model.values, **state.parameters[0]}, state.parameters[1]) for state in states]
+    pairs = [({**state.fit.model.values, **state.parameters[0]}, state.parameters[1]) for state in states]
     means = np.array([[values[name] for name in names] for values, _ in pairs])
     mean = weights @ means
     matrix = np.einsum("n,ni,nj->ij", weights, means - mean, means - mean)

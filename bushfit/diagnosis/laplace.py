@@ -5,21 +5,21 @@ from math import log
 import numpy as np
 from scipy.special import logsumexp
 
-from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.priors import LARGEST, SIZES
 from bushfit.effects import get_effect, qualified_name
 from bushfit.fitting.design import shape_start_values
+from bushfit.fitting.problem import FitResult
 
 #: Number of sizes over which the prior of an amount is averaged, and the smallest relative error that they resolve.
 _FINE, _SHARPEST = 1000, 0.01
 
 
-def laplace(name: str, evidence: Evidence, before: Evidence) -> tuple[float, dict[str, float], float]:
+def laplace(name: str, fit: FitResult, before: FitResult) -> tuple[float, dict[str, float], float]:
     """Compute the prior density and precision of the parameters of a refitted effect.
 
     Args:
         name: name of the effect.
-        evidence: fit with the effect.
+        fit: fit with the effect, with errors that the tests share if there are any.
         before: fit without the effect.
 
     Returns:
@@ -33,14 +33,12 @@ def laplace(name: str, evidence: Evidence, before: Evidence) -> tuple[float, dic
         the likelihood sets the effective width. For an effect that replaces a branch, each parameter beyond the two of
         the branch is uniform over a factor of 20.
     """
-    solution = evidence.joint or evidence.solution
-    effect, names = get_effect(name), solution.coordinates.names
-    data_sets, model = evidence.data_sets, evidence.model
+    effect, names = get_effect(name), fit.names
+    data_sets, model = fit.data_sets, fit.model
     reference = model.without(name) if effect.replaces is None else before.model
     size = max(data_set.change(model, reference) for data_set in data_sets)
     density, precision, count = 0.0, {}, 0
-    jacobian = solution.jacobian
-    variances = np.diag(np.linalg.pinv(jacobian @ jacobian.T, rcond=1e-12, hermitian=True))
+    variances = np.diag(np.linalg.pinv(fit.jacobian @ fit.jacobian.T, rcond=1e-12, hermitian=True))
     if effect.replaces is not None:
         count = max(len(effect.parameters) - 2, 0)
         precisions = {qualified_name(effect, parameter): 0.5 for parameter in effect.parameters}
@@ -68,9 +66,9 @@ def laplace(name: str, evidence: Evidence, before: Evidence) -> tuple[float, dic
         else:
             wide = max(float(np.ptp(tried)) / parameter.typical, 1.0)
         density -= log(wide)
-        if coordinate in solution.at_bound:
+        if coordinate in fit.at_bound:
             count -= 1
-            pull = abs(float(solution.jacobian[names.index(coordinate)] @ solution.residual))
+            pull = abs(float(fit.jacobian[names.index(coordinate)] @ fit.residual))
             density += log(min(wide, 1.0 / max(pull, 1e-12)))
             precision[coordinate] = np.inf
         else:

@@ -12,6 +12,8 @@ Notes:
     over cases with weights of a prior. Only inner products of rows enter; errors of the rig stay within blocks of rows.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -20,10 +22,36 @@ from itertools import pairwise
 import numpy as np
 from scipy.special import chdtrc, log_ndtr
 
-from bushfit.diagnosis.groups import Group, GroupEvidence
+from bushfit.diagnosis.explanations import Group
 from bushfit.diagnosis.priors import SIZES
 from bushfit.diagnosis.projected_columns import AT_ONCE, ProjectedColumns
 from bushfit.effects.contract import Array
+
+
+@dataclass(frozen=True, eq=False)
+class GroupEvidence:
+    """Evidence of the tests for one explanation of a gap.
+
+    Args:
+        log_evidence: natural log of the marginal likelihood of the tests with the explanation, averaged over the sizes
+            of its amounts and of the rig's errors.
+        size: relative change of |K| due to the explanation, root mean square over the posterior.
+        likeliest: most probable prior standard deviation of the amounts, relative to |K|, one of `priors.SIZES`.
+        with_compound: evidence for the explanation together with a smooth deviation of the rubber from the model's
+            laws; None if no such deviation is considered.
+    """
+
+    log_evidence: float
+    size: float
+    likeliest: float
+    with_compound: GroupEvidence | None = None
+
+    @property
+    def total(self) -> float:
+        """Natural log of the marginal likelihood, summed over compounds with and without a deviation."""
+        if self.with_compound is None:
+            return self.log_evidence
+        return float(np.logaddexp(self.log_evidence, self.with_compound.log_evidence))
 
 
 @dataclass(frozen=True, eq=False)

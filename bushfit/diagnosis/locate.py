@@ -9,11 +9,11 @@ from functools import cached_property
 
 import numpy as np
 
-from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.record import MisfitRegion
 from bushfit.effects.contract import Array
 from bushfit.fitting.measured_test import shown_amplitude
 from bushfit.fitting.preparation import MeasuredSweep, split_by_kind
+from bushfit.fitting.problem import FitResult
 from bushfit.fitting.repeats import to_unit_interval
 from bushfit.geometry import Place
 from bushfit.model.model import Model
@@ -109,17 +109,17 @@ def line_misfits(sweep: MeasuredSweep, model: Model) -> Iterator[LineMisfit]:
         yield LineMisfit(*held, frequency, amplitude, mean, noise)
 
 
-def find_regions(evidence: Evidence) -> tuple[MisfitRegion, ...]:
+def find_regions(fit: FitResult) -> tuple[MisfitRegion, ...]:
     """Find the regions of frequency and amplitude where a fitted model and the tests disagree, the worst first."""
-    found = [*_sweep_regions(evidence), *_loop_regions(evidence)]
+    found = [*_sweep_regions(fit), *_loop_regions(fit)]
     worth = [region for region in found if region.excess > _WORTH_A_LINE]
     return tuple(sorted(worth, key=lambda region: -region.excess)[:_MOST_LINES])
 
 
-def _sweep_regions(evidence: Evidence) -> Iterator[MisfitRegion]:
+def _sweep_regions(fit: FitResult) -> Iterator[MisfitRegion]:
     """Yield for each direction the regions where the storage and the loss of sweeps deviate smoothly from the model."""
-    _, sweeps = split_by_kind(evidence.data_sets)
-    lines = [line for sweep in sweeps for line in line_misfits(sweep, evidence.model)]
+    _, sweeps = split_by_kind(fit.data_sets)
+    lines = [line for sweep in sweeps for line in line_misfits(sweep, fit.model)]
     for direction, stepped in dict.fromkeys((line.direction, line.stepped) for line in lines):
         mine = [line for line in lines if line.direction == direction and line.stepped == stepped]
         for part, name in enumerate(_PARTS):
@@ -221,14 +221,14 @@ def _trend_verb(first: float, last: float) -> str:
     return "grows" if abs(last) > abs(first) else "fades"
 
 
-def _loop_regions(evidence: Evidence) -> Iterator[MisfitRegion]:
+def _loop_regions(fit: FitResult) -> Iterator[MisfitRegion]:
     """Yield a region for each loop, with the harmonic in which its force deviates most from the model."""
-    loops, _ = split_by_kind(evidence.data_sets)
+    loops, _ = split_by_kind(fit.data_sets)
     for data_set in loops:
         columns, amplitude = data_set.smooth_changes(), data_set.prepared.amplitude
         norms = np.maximum(np.linalg.norm(columns, axis=1), np.finfo(float).tiny)
         first = len(columns) // 2 + 1  # of the sines, which follow the mean and the cosines
-        amounts = columns @ evidence.residual[evidence.residual_rows[data_set]] / norms
+        amounts = columns @ fit.residual[fit.residual_rows[data_set]] / norms
         by_order = [np.hypot(values[:first], [0.0, *values[first:]]) for values in (amounts, amounts / norms)]
         order = int(np.argmax(by_order[0]))
         share = by_order[1][order]

@@ -21,15 +21,15 @@ import numpy as np
 from scipy.special import logsumexp
 
 from bushfit.campaign.schema import RigSettings
-from bushfit.diagnosis.evidence import Evidence
-from bushfit.diagnosis.explanations import unnamed_curves
-from bushfit.diagnosis.groups import Group
+from bushfit.diagnosis.explanations import Group
 from bushfit.diagnosis.linear_model import LinearModel
 from bushfit.diagnosis.priors import DECISIVE_CHI_SQUARE
 from bushfit.diagnosis.rig_errors import in_scatter_units, rig_errors
+from bushfit.diagnosis.smooth_deviations import unnamed_curves
 from bushfit.effects.contract import Array
 from bushfit.fitting.coordinates import Bounds, Coordinates, coordinate_bounds
 from bushfit.fitting.preparation import MeasuredSweep, MeasuredTest, log_slopes
+from bushfit.fitting.problem import FitResult
 from bushfit.geometry import STRAINING
 from bushfit.model.covariance import Z95
 from bushfit.model.model import Model
@@ -154,17 +154,17 @@ class Term:
     `measure`, (p,). A shape is a value for a unit amount.
 
     Args:
-        evidence: the fitted model and the tests.
+        fit: the fitted model and the tests.
         measure: unit of the added stiffness, see `Measure`.
     """
 
-    evidence: Evidence
+    fit: FitResult
     measure: Measure
 
     @cached_property
     def tests(self) -> list[tuple[MeasuredTest, slice]]:
         """Tests to which the stiffness is added, each with the slice of its operating points among all points."""
-        tests = [test for test in self.evidence.data_sets if test.direction.motion is not STRAINING]
+        tests = [test for test in self.fit.data_sets if test.direction.motion is not STRAINING]
         ends = np.cumsum([0, *(test.frequency.size for test in tests)]).tolist()
         return [(test, slice(*pair)) for test, pair in zip(tests, pairwise(ends), strict=True)]
 
@@ -177,7 +177,7 @@ class Term:
     @cached_property
     def points(self) -> Array:
         """Centred natural logs of frequency and motion (displacement, rotation or strain) at each point, (p, 2)."""
-        model, over_strain = self.evidence.model, self.measure != "stiffness"
+        model, over_strain = self.fit.model, self.measure != "stiffness"
         axes = [
             (test.frequency, test.amplitude * (model.unit_strain(test.direction) if over_strain else 1.0))
             for test, _ in self.tests
@@ -208,9 +208,9 @@ class Term:
         Returns:
             Residuals of all tests and priors, (n,).
         """
-        residuals, added = self.evidence.solution.problem.residual(model), value * self.unit(model)
+        residuals, added = self.fit.problem.residual(model), value * self.unit(model)
         for test, points in self.tests:
-            rows = self.evidence.residual_rows[test]
+            rows = self.fit.residual_rows[test]
             if isinstance(test, MeasuredSweep):
                 residuals[rows] = test.whiten(test.deviation(test.stiffness(model) + added[points]))
             else:
@@ -229,9 +229,9 @@ class Term:
             Residuals extrapolated to no added stiffness, (n,); derivatives with respect to the coordinates of the
             parameters, (k, n); and with respect to the amounts of each shape in phase and in quadrature, (c, 2, n).
         """
-        names, place = self.evidence.solution.coordinates.names, self.evidence.residual_rows
+        names, place = self.fit.coordinates.names, self.fit.residual_rows
         added, changes = value * self.unit(model), np.concatenate((shapes, 1j * shapes)) * self.unit(model)
-        residuals, rows = self.residual(value, model), np.array(self.evidence.solution.problem.jacobian(model))
+        residuals, rows = self.residual(value, model), np.array(self.fit.problem.jacobian(model))
         slopes = Coordinates.of_parameters(model, names).slopes(model.values)[:, None]
         columns = np.zeros((len(changes), residuals.size))
         for test, points in self.tests:
@@ -250,7 +250,7 @@ class Term:
 
 
 def nearest_power_law(
-    fitted: Evidence, rig: RigSettings, start: Mapping[str, float], bounds: Bounds
+    fitted: FitResult, rig: RigSettings, start: Mapping[str, float], bounds: Bounds
 ) -> PowerLaw | None:
     """Estimate the power law nearest to the gap of a fitted model.
 
@@ -265,7 +265,7 @@ def nearest_power_law(
     """
     bare, model = in_scatter_units(fitted), fitted.model
     begun = model.with_values({name: value for name, value in start.items() if name in model.values})
-    rows, smooth_curves = bare.solution.jacobian, [curve.group for curve in unnamed_curves(bare) if curve.group]
+    rows, smooth_curves = bare.jacobian, [curve.group for curve in unnamed_curves(bare) if curve.group]
     plain = LinearModel(bare.residual, rows, np.zeros(len(rows)), rig_errors(bare, rig), smooth_curves)
     plain = replace(plain, chosen_cases=plain.likely_cases(_NEAR))
     terms = [term for measure in _MEASURES if (term := Term(bare, measure)).has_one_meaning]
@@ -333,7 +333,7 @@ class _Grid:
         return np.stack((np.arctan2(parts[:, 1], parts[:, 0]), *powers.T))
 
 
-def _settled_grid(fitted: Evidence, term: Term, plain: LinearModel, model: Model, bounds: Bounds) -> _Grid | None:
+def _settled_grid(fitted: FitResult, term: Term, plain: LinearModel, model: Model, bounds: Bounds) -> _Grid | None:
     """Find the powers of frequency and amplitude nearest to a gap, on a grid that narrows about the likeliest pair.
 
     Args:
@@ -384,7 +384,7 @@ def _stepped(term: Term, model: Model, value: Array, shape: Array, bounds: Bound
     """
     shape = term.scaled(shape, model)
     residuals, rows, columns = term.linearised(model, value, shape)
-    design, coordinates = np.concatenate((rows, columns[0])), term.evidence.solution.coordinates
+    design, coordinates = np.concatenate((rows, columns[0])), term.fit.coordinates
     low, high = coordinate_bounds(coordinates, bounds)
     misfit, best = np.inf, (model, value)
     for damping in _DAMPINGS:

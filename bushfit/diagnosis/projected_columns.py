@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from bushfit.diagnosis.groups import Group
+from bushfit.diagnosis.explanations import Group
 from bushfit.diagnosis.rig_errors import RigErrors
 from bushfit.effects.contract import Array
 

@@ -12,16 +12,14 @@ from itertools import product
 
 import numpy as np
 
-from bushfit.diagnosis.evidence import Evidence
-from bushfit.diagnosis.explanations import Explanation
-from bushfit.diagnosis.groups import Group
+from bushfit.diagnosis.explanations import Explanation, Group
 from bushfit.effects import Branch, Effect, effects_for_places, qualified_name, twins_of
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError, ModelError
 from bushfit.fitting.descent import Descent
 from bushfit.fitting.design import shape_start_values
 from bushfit.fitting.preparation import MeasuredTest
-from bushfit.fitting.problem import FitProblem
+from bushfit.fitting.problem import FitProblem, FitResult
 from bushfit.geometry import shared_labels
 from bushfit.model.model import Model
 
@@ -52,39 +50,40 @@ class Proposal(Explanation):
     visible: bool
 
 
-def proposals(evidence: Evidence, excluded: Collection[str], fixed: Sequence[str]) -> list[Proposal]:
+def proposals(fit: FitResult, excluded: Collection[str], fixed: Sequence[str]) -> list[Proposal]:
     """Rank the effects of the library that a fitted model lacks by their expected decrease of chi-square.
 
     Args:
-        evidence: the fitted model and the tests.
+        fit: the fitted model and the tests.
         excluded: names of effects not to consider, with their twins.
         fixed: names of parameters that are not fitted.
 
     Returns:
         One proposal for each effect, at its best shape parameters, the highest score first.
     """
-    relative_noise = np.zeros(evidence.residual.size)
-    for test, rows in evidence.residual_rows.items():
+    relative_noise = np.zeros(fit.residual.size)
+    for test, rows in fit.residual_rows.items():
         relative_noise[rows] = test.relative_noise
-    ranked, places = [], shared_labels(test.direction for test in evidence.data_sets)
-    for effect in missing_effects(evidence.model, places, excluded):
+    ranked, basis = list[Proposal](), parameter_basis(fit.jacobian)
+    places = shared_labels(test.direction for test in fit.data_sets)
+    for effect in missing_effects(fit.model, places, excluded):
         family = effect.name.partition(".")[0]
         if effect.replaces is not None:
-            if effect.replaces in evidence.model.effects and (start := _replacement(evidence, effect, fixed)):
+            if effect.replaces in fit.model.effects and (start := _replacement(fit, effect, fixed)):
                 ranked.append(Proposal("effect", family, effect.name, None, *start, visible=True))
             continue
-        shapes, columns = sensitivity(evidence.model, evidence.data_sets, effect)
+        shapes, columns = sensitivity(fit.model, fit.data_sets, effect)
         if not shapes:
             continue
-        columns = np.pad(columns, ((0, 0), (0, evidence.residual.size - columns.shape[1])))  # rows of priors
-        gains, amounts, visible = scores(evidence, columns)
+        columns = np.pad(columns, ((0, 0), (0, fit.residual.size - columns.shape[1])))  # rows of priors
+        gains, amounts, visible = scores(columns, fit.residual, basis)
         amount = effect.amount
         sign = 1 if amount.neutral == amount.bounds[0] else 0
         gains = np.where((amounts > 0.0) | (sign == 0), gains, 0.0)
         best = int(np.argmax(gains))
         suggested = float(np.clip(amounts[best] * amount.typical, *amount.bounds))
         shape = shapes[best] | ({qualified_name(effect, amount): suggested} if amount.log else {})
-        model = evidence.model.with_effect(effect.name, shape)
+        model = fit.model.with_effect(effect.name, shape)
         group = Group(columns, np.abs(columns * relative_noise).max(axis=1), act_together=False, sign=sign)
         ranked.append(
             Proposal("effect", family, effect.name, group, model, float(gains[best]), visible=bool(visible.any()))
@@ -92,12 +91,13 @@ def proposals(evidence: Evidence, excluded: Collection[str], fixed: Sequence[str
     return sorted(ranked, key=lambda proposal: (-proposal.score, proposal.group is None))
 
 
-def scores(evidence: Evidence, columns: Array) -> tuple[Array, Array, Array]:
+def scores(columns: Array, residual: Array, basis: Array) -> tuple[Array, Array, Array]:
     """Decrease of chi-square if each of c changes of the residuals is fitted together with the parameters.
 
     Args:
-        evidence: the fitted model and the tests.
         columns: changes of the n whitened residuals per unit amount, (c, n).
+        residual: whitened residuals of the fitted model, (n,).
+        basis: basis of the residuals that its parameters can absorb, from `parameter_basis`, (n, k).
 
     Returns:
         Decrease of chi-square, best amount, and True for visible changes, (c,) each. Decrease and amount are 0 for
@@ -106,11 +106,17 @@ def scores(evidence: Evidence, columns: Array) -> tuple[Array, Array, Array]:
     lengths = np.linalg.norm(columns, axis=1)
     lengths = np.where(lengths > 0.0, lengths, 1.0)
     unit = columns / lengths[:, None]
-    projected = unit - (unit @ evidence.span) @ evidence.span.T
-    squares, products = np.einsum("ij,ij->i", projected, projected), projected @ evidence.residual
+    projected = unit - (unit @ basis) @ basis.T
+    squares, products = np.einsum("ij,ij->i", projected, projected), projected @ residual
     visible = squares > _LEFT**2
     inverse = visible / np.where(visible, squares, 1.0)
     return inverse * np.square(products), -inverse * products / lengths, visible
+
+
+def parameter_basis(jacobian: Array) -> Array:
+    """Orthonormal basis of the residuals that parameters can absorb, (n, k), from their derivatives, (k, n)."""
+    basis, size, _ = np.linalg.svd(jacobian.T, full_matrices=False)
+    return basis[:, size > 1e-10 * size[0]]
 
 
 def has_used_parameters(effect: Effect, model: Model) -> bool:
@@ -143,11 +149,11 @@ def missing_effects(model: Model, places: Collection[str], excluded: Collection[
     ]
 
 
-def _replacement(evidence: Evidence, effect: Effect, fixed: Sequence[str]) -> tuple[Model, float] | None:
+def _replacement(fit: FitResult, effect: Effect, fixed: Sequence[str]) -> tuple[Model, float] | None:
     """Replace a branch of a fitted model by an effect, with the starting values that promise the best fit.
 
     Args:
-        evidence: the fitted model and the tests.
+        fit: the fitted model and the tests.
         effect: effect that replaces the branch.
         fixed: names of parameters that are not fitted.
 
@@ -155,15 +161,15 @@ def _replacement(evidence: Evidence, effect: Effect, fixed: Sequence[str]) -> tu
         The model at these values, and the expected decrease of chi-square; None if the effect has no response.
     """
     ends = list[tuple[float, Model]]()
-    for start in evidence.model.start_values_for(effect):
+    for start in fit.model.start_values_for(effect):
         with suppress(FitError, ModelError):  # no response from there
-            with_effect = evidence.model.with_effect(effect.name, start)
-            fit = Descent.start(FitProblem.with_fixed(with_effect, evidence.data_sets, fixed, {}))
-            ends.append((fit.chi_square - fit.expected_fall, fit.model))
+            with_effect = fit.model.with_effect(effect.name, start)
+            descent = Descent.start(FitProblem.with_fixed(with_effect, fit.data_sets, fixed, {}))
+            ends.append((descent.chi_square - descent.expected_fall, descent.model))
     if not ends:
         return None
     chi_square, model = min(ends, key=lambda end: end[0])
-    return model, max(evidence.chi_square - chi_square, 0.0)
+    return model, max(fit.chi_square - chi_square, 0.0)
 
 
 def sensitivity(

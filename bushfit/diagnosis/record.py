@@ -16,11 +16,11 @@ from bushfit.diagnosis.document import (
     SizeEntry,
     Verdict,
 )
-from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.holdout import HoldOut
 from bushfit.effects import effect_name_of, get_parameter
 from bushfit.effects.mistakes import get_candidate, labelled
 from bushfit.effects.unnamed import NAME as UNNAMED
+from bushfit.fitting.problem import FitResult
 from bushfit.geometry import Place
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
@@ -197,8 +197,8 @@ class Diagnosis:
     holdout: HoldOut
     next_test: str
     candidates: tuple[CandidateResult, ...]
-    before: Evidence
-    after: Evidence
+    before: FitResult
+    after: FitResult
     result: Result
     notes: tuple[str, ...] = ()
     description: Description | None = None

@@ -8,16 +8,16 @@ from functools import cached_property
 
 from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.claims import Claim
-from bushfit.diagnosis.evidence import Evidence
-from bushfit.diagnosis.explanations import Explanation, FaultyPart, compound, unnamed_curves
-from bushfit.diagnosis.faulty_parts import find_faulty_parts
-from bushfit.diagnosis.groups import Group
+from bushfit.diagnosis.explanations import Explanation, Group
+from bushfit.diagnosis.faulty_parts import FaultyPart, find_faulty_parts
 from bushfit.diagnosis.record import DiagnosisSettings
 from bushfit.diagnosis.rig_errors import RigErrors, in_scatter_units, rig_errors
+from bushfit.diagnosis.smooth_deviations import compound, unnamed_curves
+from bushfit.fitting.problem import FitResult
 
 
 @dataclass(frozen=True, eq=False)
-class Tests:
+class RecordedTests:
     """Tests as recorded, or with one mistake in the record corrected, with the starting model fitted to them.
 
     Args:
@@ -30,7 +30,7 @@ class Tests:
         max_effects: maximum number of effects of an explanation.
     """
 
-    base: Evidence
+    base: FitResult
     rig: RigSettings
     without: Sequence[str]
     log_prior: float
@@ -39,7 +39,7 @@ class Tests:
     max_effects: int = DiagnosisSettings.max_effects
 
     @cached_property
-    def bare(self) -> Evidence:
+    def bare(self) -> FitResult:
         """Fit of the starting model with residuals in units of the scatter from point to point, to compare hypotheses.
 
         Errors that points share are not part of this unit; `errors` describes them.

@@ -1,4 +1,8 @@
-"""The reported diagnosis: summary, named effects with their sizes, regions of disagreement and next test."""
+"""The reported diagnosis: what closes the gap, and the texts on it.
+
+`DiagnosisWriter` receives the verdict of a search. It determines the model to use (`_close_gap`), changes the verdict
+if held-out tests or intervals contradict it, and writes summary, causes, regions of disagreement and next test.
+"""
 
 from __future__ import annotations
 
@@ -9,30 +13,27 @@ import numpy as np
 
 from bushfit.diagnosis.described import GapDescription, describe
 from bushfit.diagnosis.document import Verdict
-from bushfit.diagnosis.evidence import Evidence, fit, result_of
 from bushfit.diagnosis.explanation_text import (
-    LEVELS,
-    NAMELESS,
     causes_text,
-    claim_entries,
     explanation_odds,
-    label,
     list_candidates,
     probability_text,
     undecided_text,
 )
+from bushfit.diagnosis.fits import fit_model, result_of
 from bushfit.diagnosis.holdout import HoldOut, hold_out
-from bushfit.diagnosis.hypotheses import DiagnosisRequest, Hypothesis, mean_parameters
+from bushfit.diagnosis.hypotheses import Hypothesis, mean_parameters
 from bushfit.diagnosis.locate import find_regions
 from bushfit.diagnosis.next_test import deciding_test
 from bushfit.diagnosis.priors import LARGEST_CLOSED_GAP, NAMED
-from bushfit.diagnosis.record import Diagnosis, MisfitRegion, NamedCause
+from bushfit.diagnosis.record import Diagnosis, NamedCause
 from bushfit.diagnosis.search import Search
-from bushfit.diagnosis.verdict import Composition, Finding, decide_verdict
+from bushfit.diagnosis.verdict import LEVELS, NAMELESS, Composition, Finding, decide_verdict
 from bushfit.effects import get_effect, qualified_name
 from bushfit.effects.mistakes import get_candidate
 from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.fitting.preparation import split_by_kind, with_gain_weighting
+from bushfit.fitting.problem import FitResult
 from bushfit.model.covariance import Covariance
 from bushfit.model.result import Result
 from bushfit.units import display_unit, format_aligned, number
@@ -43,6 +44,30 @@ _ONE_DIRECTION = (
     "one direction was tested: a deviation of the compound and a smooth fault of the rig cannot be distinguished; test "
     "another direction or specimen"
 )
+#: Advice if levels disagree by more than the class of the rig.
+_LEVELS_ADVICE = "measure the levels again in another session, or state the class of the rig (gain_error under [rig])"
+
+
+@dataclass(frozen=True, eq=False)
+class Closing:
+    """Model that closes a gap as far as possible.
+
+    Args:
+        certain: fit of the starting model with the effects that are certain.
+        known: covariance of the amounts of effects that the fit kept fixed; None without any.
+        gap: description of the gap that the correction closes; None without a correction.
+        holdout: residuals of held-out tests, if they were computed for the decision; else None.
+    """
+
+    certain: FitResult
+    known: Covariance | None = None
+    gap: GapDescription | None = None
+    holdout: HoldOut | None = None
+
+    @property
+    def fit(self) -> FitResult:
+        """Model that closes the gap: with the certain effects, and with the smooth correction if there is one."""
+        return self.gap.after if self.gap else self.certain
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +75,7 @@ class DiagnosisWriter:
     """Builder of the reported diagnosis from the verdict of a search.
 
     Args:
-        search: completed search, with the tests.
+        search: completed search, with the tests and the starting model fitted to them.
         finding: verdict on the hypotheses, with the explanations to report.
         hypotheses: all hypotheses that were compared, the most probable first.
     """
@@ -58,12 +83,7 @@ class DiagnosisWriter:
     search: Search
     finding: Finding
     hypotheses: Sequence[Hypothesis]
-    _refitted: dict[Evidence, Evidence] = field(default_factory=dict)
-
-    @property
-    def request(self) -> DiagnosisRequest:
-        """Input of the search, with the tests and the starting model fitted to them."""
-        return self.search.request
+    _refitted: dict[FitResult, FitResult] = field(default_factory=dict)
 
     @property
     def first(self) -> Composition | None:
@@ -76,48 +96,40 @@ class DiagnosisWriter:
         Returns:
             Verdict, effects, regions, hold-out, next test and the model to use.
         """
-        verdict, first = self.finding.verdict, self.first
+        first, verdict = self.first, self.finding.verdict
         if first is None:
-            return self._build(_NOTHING, self.request.base)
+            return self._build(Closing(self._with_free_gains(self.search.base)), _NOTHING)
+        if verdict in ("named", "partly") and first.best.claim:
+            return self._mistaken_record(first)
+        closing = self._close_gap(first)
         if verdict in ("named", "partly"):
-            return self._mistaken_record(first) if first.best.claim else self._named(first)
-        return self._open(first)
+            diagnosis = self._named(first, closing)
+            revised = self._revised_finding(diagnosis, closing.holdout)
+            return replace(self, finding=revised).diagnosis() if revised else diagnosis
+        if (holdout := closing.holdout) and (holdout.after or np.inf) >= (holdout.before or 0.0):
+            return replace(self, finding=replace(self.finding, names=())).diagnosis()
+        return self._undecided(first, closing) if verdict == "ambiguous" else self._nameless(first, closing)
 
-    def _named(self, first: Composition) -> Diagnosis:
-        """Diagnosis in which named effects explain the gap, or part of it with a description of the rest."""
-        names, base = self.finding.names, self._with_free_gains(self.request.base)
-        after, known = self._fit_with(first)
-        plain, verbs = self._with_free_gains(after), ("closes", "explains") if len(names) == 1 else ("close", "explain")
-        why = f"lowers chi-square by {base.chi_square - plain.chi_square:.0f}"
-        why += " with the other named effects" * (len(names) > 1)
-        entries = [NamedCause(name, f"{why}; {probability_text(first, self.finding)}") for name in names]
-        gap, holdout, summary = None, None, f"{' and '.join(names)} {verbs[0]} the gap"
-        if self.finding.verdict == "named":
-            holdout = hold_out(base, plain, self.request.data.bounds)
-        else:
-            excess = [max(fitted.mean_square - 1.0, 0.0) for fitted in (base, plain)]
-            share = 100.0 * (1.0 - excess[1] / excess[0]) if excess[0] else 100.0
-            part = f"{number(share, 2)} %" if share >= 1.0 else "part"
-            summary = f"{' and '.join(names)} {verbs[1]} {part} of the gap"
-            gap = None if first.best.levels else self._described(after)
-            entries += [NamedCause(UNNAMED, gap.evidence)] if gap else []
-        rest = [part.name for part in first.faulty_parts] + [LEVELS] * first.best.levels
-        rest += [f"{NAMELESS} ({gap.sentence})" if gap else NAMELESS] * bool(gap or first.unnamed)
-        places = first.best if first.faulty_parts else None
-        diagnosis = self._build(
-            summary, gap.after if gap else after, entries, rest, places=places, gap=gap, holdout=holdout, known=known
-        )
-        absent = tuple(name for name in names if _may_be_absent(name, diagnosis.result))
-        if holdout and (absent or (holdout.after or 0.0) > LARGEST_CLOSED_GAP):
-            finding = decide_verdict(self.hypotheses, self.request.settings.tolerance, gap_stays=True)
-        elif absent:  # the model does without these effects
-            kept, leads = tuple(name for name in names if name not in absent), (*absent, *self.finding.leads)
-            finding = replace(self.finding, verdict="partly" if kept else "described", names=kept, leads=leads)
-        else:
-            return diagnosis
-        return replace(self, finding=finding).diagnosis()
+    def _close_gap(self, first: Composition) -> Closing:
+        """Fit the effects that are certain, and describe what they leave by a smooth correction.
 
-    def _fit_with(self, first: Composition) -> tuple[Evidence, Covariance | None]:
+        No correction is made if one explanation closes the gap, or if tests or records may be wrong. Without it, the
+        amounts of effects may be distorted, so held-out tests are predicted with and without them.
+        """
+        verdict, search, reported = self.finding.verdict, self.search, self.finding.reported
+        may_be_wrong = {
+            "partly": first.best.levels,
+            "ambiguous": any(composition.faulty_parts or composition.best.claim for composition in reported),
+        }
+        fit, known = self._fit_certain(first)
+        base, fit, gap = self._with_free_gains(search.base), self._with_free_gains(fit), None
+        if search.settings.max_effects and verdict not in ("named", "unexplained") and not may_be_wrong.get(verdict):
+            rig, has_candidates = search.data.campaign.rig, verdict == "ambiguous"
+            gap = describe(fit, rig, search.start, search.data.bounds, before=base, has_candidates=has_candidates)
+        is_compared = verdict == "named" or (verdict == "ambiguous" and self.finding.names and not gap)
+        return Closing(fit, known, gap, hold_out(base, fit, search.data.bounds) if is_compared else None)
+
+    def _fit_certain(self, first: Composition) -> tuple[FitResult, Covariance | None]:
         """Fit the starting model with the effects of an explanation that are certain.
 
         Args:
@@ -127,173 +139,224 @@ class DiagnosisWriter:
         Returns:
             The fit, and the covariance of the amounts that were fixed; None if all were fitted.
         """
-        base, bounds, names = self.request.base, self.request.data.bounds, self.finding.names
+        base, bounds, names = self.search.base, self.search.data.bounds, self.finding.names
         if not names:
             return base, None
         refitted = [h for h in self.hypotheses if h.refitted and not h.claim and set(h.effects) >= set(names)]
         if not first.unnamed:
             state = min((h.state for h in refitted), key=lambda state: len(state.effects) > len(names))
-            model = state.evidence.model.without(*{*state.effects} - {*names})
-            return fit(model, base.data_sets, base.fixed, bounds), None
+            model = state.fit.model.without(*{*state.effects} - {*names})
+            return fit_model(model, base.data_sets, base.fixed, bounds), None
         model = base.model
         for name in names:
             model = model.with_effect(name)
         added, known = mean_parameters(refitted, [name for name in model.values if name not in base.model.values])
-        return fit(model.with_values(added), base.data_sets, [*base.fixed, *added], bounds), known
+        return fit_model(model.with_values(added), base.data_sets, [*base.fixed, *added], bounds), known
 
-    def _described(self, evidence: Evidence) -> GapDescription | None:
-        """Describe the gap of a fit by a smooth correction; None if effects are excluded or no correction is valid."""
-        data, base, fitted = self.request.data, self.request.base, self._with_free_gains(evidence)
-        if not self.request.settings.max_effects:
-            return None
-        return describe(
-            fitted,
-            data.campaign.rig,
-            self.request.start,
-            data.bounds,
-            before=self._with_free_gains(base),
-            has_candidates=self.finding.verdict == "ambiguous",
+    def _with_free_gains(self, fit: FitResult) -> FitResult:
+        """Refit a model without the assumed gain error of loops; unchanged if the campaign states a gain error."""
+        loops = split_by_kind(fit.data_sets)[0]
+        gain_is_stated = self.search.data.campaign.rig.stiffness_errors[0] is not None
+        if gain_is_stated or not any(loop.gain_weighs for loop in loops):
+            return fit
+        if fit not in self._refitted:
+            data_sets = with_gain_weighting(fit.data_sets, weigh=False)
+            self._refitted[fit] = fit_model(fit.model, data_sets, fit.fixed, self.search.data.bounds)
+        return self._refitted[fit]
+
+    def _named(self, first: Composition, closing: Closing) -> Diagnosis:
+        """Diagnosis in which named effects explain the gap, or part of it with a description of the rest."""
+        names, base, fit, gap = (
+            self.finding.names,
+            self._with_free_gains(self.search.base),
+            closing.certain,
+            closing.gap,
         )
+        verbs = ("closes", "explains") if len(names) == 1 else ("close", "explain")
+        why = f"lowers chi-square by {base.chi_square - fit.chi_square:.0f}"
+        why += " with the other named effects" * (len(names) > 1)
+        entries = [NamedCause(name, f"{why}; {probability_text(first, self.finding)}") for name in names]
+        summary = f"{' and '.join(names)} {verbs[0]} the gap"
+        if self.finding.verdict == "partly":
+            excess = [max(fitted.mean_square - 1.0, 0.0) for fitted in (base, fit)]
+            share = 100.0 * (1.0 - excess[1] / excess[0]) if excess[0] else 100.0
+            part = f"{number(share, 2)} %" if share >= 1.0 else "part"
+            summary = f"{' and '.join(names)} {verbs[1]} {part} of the gap"
+            entries += [NamedCause(UNNAMED, gap.evidence)] if gap else []
+        rest = [part.name for part in first.faulty_parts] + [LEVELS] * first.best.levels
+        rest += [f"{NAMELESS} ({gap.sentence})" if gap else NAMELESS] * bool(gap or first.unnamed)
+        return self._build(closing, summary, entries, rest, places=first.best if first.faulty_parts else None)
+
+    def _revised_finding(self, diagnosis: Diagnosis, holdout: HoldOut | None) -> Finding | None:
+        """Verdict in place of "named" or "partly" if intervals or held-out tests contradict the named effects.
+
+        Args:
+            diagnosis: diagnosis with the named effects.
+            holdout: residuals of held-out tests with effects that should close the gap; None if a part of it stays.
+
+        Returns:
+            The new verdict; None if nothing contradicts the effects.
+        """
+        finding, names = self.finding, self.finding.names
+        absent = tuple(name for name in names if _may_be_absent(name, diagnosis.result))
+        if holdout and (absent or (holdout.after or 0.0) > LARGEST_CLOSED_GAP):
+            return decide_verdict(self.hypotheses, self.search.settings.tolerance, gap_stays=True)
+        if not absent:
+            return None
+        kept, leads = tuple(name for name in names if name not in absent), (*absent, *finding.leads)
+        return replace(finding, verdict="partly" if kept else "described", names=kept, leads=leads)
 
     def _mistaken_record(self, first: Composition) -> Diagnosis:
         """Diagnosis in which a mistake in the record explains the gap; the model to use is unchanged."""
-        best, claim = first.best, first.best.claim
+        best, claim, base = first.best, first.best.claim, self._with_free_gains(self.search.base)
         assert claim is not None
         command, corrections = f"bushfit diagnose CAMPAIGN {claim.options}", "; ".join(claim.corrections)
         advice = f"if the records of the tests confirm this mistake, state {corrections} (or {command})"
         summary = f"these tests agree if {claim.sentence}"
-        entries = claim_entries(first, self.finding, self.request.base)
-        diagnosis = self._build(summary, self.request.base, entries, places=best, next_test=advice)
+        after = self._with_free_gains(best.state.plain)
+        closing = Closing(base, holdout=hold_out(base, after, self.search.data.bounds))
+        diagnosis = self._build(closing, summary, self._record_entries(first), places=best, next_test=advice)
         warning = f"fitted to the tests as they are, which only agree if {claim.sentence}: {advice}"
-        after = self._with_free_gains(best.state.evidence)
-        return replace(
-            diagnosis,
-            after=after,
-            remainder=find_regions(after),
-            holdout=hold_out(diagnosis.before, after, self.request.data.bounds),
-            result=replace(diagnosis.result, warnings=(*diagnosis.result.warnings, warning)),
-        )
+        result = replace(diagnosis.result, warnings=(*diagnosis.result.warnings, warning))
+        return replace(diagnosis, after=after, remainder=find_regions(after), result=result)
 
-    def _open(self, first: Composition) -> Diagnosis:
-        """Diagnosis of a gap without a certain cause: additions that close it, candidate causes, and a deciding test.
+    def _undecided(self, first: Composition, closing: Closing) -> Diagnosis:
+        """Diagnosis of a gap with several possible causes: what closes it, the causes, and the test that decides."""
+        reported, gap = self.finding.reported, closing.gap
+        candidates = self._candidates
+        leader = candidates[0] if candidates else first
+        rest = "the rest of the gap" if self.finding.names else "the gap"
+        sentences = [undecided_text(reported)]
+        sentences += [f"a smooth correction closes {rest}: {gap.sentence}"] if gap else []
+        others = tuple(composition.label for composition in reported if composition is not leader)
+        entries = self._record_entries(leader, others)
+        if not entries:
+            why = probability_text(leader, self.finding)
+            entries = [NamedCause(name, why, others) for name in leader.names]
+        faulty = next((composition.best for composition in reported if composition.faulty_parts), None)
+        advice = self._deciding_advice(leader)
+        return self._build(closing, "; ".join(sentences), entries, places=faulty, next_test=advice)
 
-        If neither a test nor the record is suspected to be wrong, the effects that all probable explanations contain
-        close the gap together with a smooth correction. The candidates are the reported explanations with causes.
-        """
-        finding, reported, verdict = self.finding, self.finding.reported, self.finding.verdict
-        bounds = self.request.data.bounds
-        is_ambiguous = verdict == "ambiguous"
-        faulty = [composition for composition in reported if composition.faulty_parts] if is_ambiguous else [first]
-        may_be_wrong = is_ambiguous and (faulty or any(composition.best.claim for composition in reported))
-        after, known = self._fit_with(first)
-        gap, holdout = None if may_be_wrong or verdict == "unexplained" else self._described(after), None
-        if finding.names and not gap:  # without the rest, their amounts may be distorted
-            holdout = hold_out(self._with_free_gains(self.request.base), self._with_free_gains(after), bounds)
-            if (holdout.after or np.inf) >= (holdout.before or 0.0):
-                return replace(self, finding=replace(finding, names=())).diagnosis()
-        rest = "the rest of the gap" if finding.names else "the gap"
-        closing = [f"a smooth correction closes {rest}: {gap.sentence}"] if gap else []
-        candidates = [c for c in reported if c.probability > 1.0 - NAMED and c.causes]
-        leader, advice = candidates[0] if candidates else first, self._deciding_test()
-        if claim := leader.best.claim:
-            advice = f"check the records of the tests; {'; '.join(claim.corrections)}"
-        elif decided := [*(x for x in finding.leads if get_candidate(x).twins), *(() if advice else leader.names)]:
-            advice = get_effect(decided[0]).confirmed_by  # of a lead: whether it is of the bushing or of the rig
-        if is_ambiguous:
-            sentences = [undecided_text(reported), *closing]
-            others = tuple(label(composition) for composition in reported if composition is not leader)
-            entries = claim_entries(leader, finding, self.request.base, others)
-            entries += [NamedCause(x, probability_text(leader, finding), others) for x in leader.names if not claim]
+    def _nameless(self, first: Composition, closing: Closing) -> Diagnosis:
+        """Diagnosis of a gap that no known effect explains: a smooth correction, or the tests to measure again."""
+        gap, candidates = closing.gap, self._candidates
+        advice = self._deciding_advice(candidates[0] if candidates else first)
+        at_fault = " and ".join(part.name for part in first.best.faulty_parts)
+        if gap:
+            sentences = [f"a smooth correction closes the gap: {gap.sentence}", *causes_text(candidates, self.finding)]
+            sentences += [f"it is largest at {at_fault}"] if at_fault else []
+        elif at_fault:
+            sentences = [f"measure again first: {at_fault}; all other tests disagree with this part"]
+        elif self.finding.verdict == "unexplained":
+            sentences = ["the levels disagree by more than the class of the rig, and nothing else is missing"]
+            advice = _LEVELS_ADVICE
         else:
-            sentences = [*(closing or ["no known effect closes the gap"]), *causes_text(candidates, finding)]
-            entries = [NamedCause(UNNAMED, gap.evidence, tuple(map(label, candidates)))] if gap else []
-            at_fault = " and ".join(part.name for part in first.best.faulty_parts)
-            if gap:
-                sentences += [f"it is largest at {at_fault}"] if at_fault else []
-            elif at_fault:
-                sentences = [f"measure again first: {at_fault}; all other tests disagree with this part"]
-            elif verdict == "unexplained":
-                sentences = ["the levels disagree by more than the class of the rig, and nothing else is missing"]
-                advice = "measure the levels again in another session, or state the class of the rig (gain_error under "
-                advice += "[rig])"
-            verdict = "described" if gap else "unexplained"
-        return self._build(
-            "; ".join(sentences),
-            gap.after if gap else after,
-            entries,
-            verdict=verdict,
-            places=faulty[0].best if faulty and not gap else None,
-            next_test=advice,
-            gap=gap,
-            holdout=holdout,
-            known=known,
-        )
+            sentences = ["no known effect closes the gap", *causes_text(candidates, self.finding)]
+        entries = [NamedCause(UNNAMED, gap.evidence, tuple(c.label for c in candidates))] if gap else []
+        places = first.best if first.faulty_parts and not gap else None
+        verdict: Verdict = "described" if gap else "unexplained"
+        return self._build(closing, "; ".join(sentences), entries, verdict=verdict, places=places, next_test=advice)
 
-    def _deciding_test(self) -> str:
-        """Test that separates the reported explanations with effects; "" if none does."""
+    @property
+    def _candidates(self) -> list[Composition]:
+        """Reported explanations with causes that are probable, the most probable first."""
+        return [c for c in self.finding.reported if c.probability > 1.0 - NAMED and c.causes]
+
+    def _deciding_advice(self, leader: Composition) -> str:
+        """Advice on the test that separates the possible causes, or that tells the bushing from the rig.
+
+        Args:
+            leader: most probable explanation with causes.
+        """
+        if claim := leader.best.claim:
+            return f"check the records of the tests; {'; '.join(claim.corrections)}"
         fitted = [c for c in self.finding.reported if c.best.effects and c.best.refitted]
-        models, odds = [c.best.state.evidence.model for c in fitted], [c.probability for c in fitted]
-        return deciding_test(models, odds, self.request.base.data_sets, self.request.data.campaign.rig)
+        models, odds = [c.best.state.fit.model for c in fitted], [c.probability for c in fitted]
+        advice = deciding_test(models, odds, self.search.base.data_sets, self.search.data.campaign.rig)
+        leads = [name for name in self.finding.leads if get_candidate(name).twins]
+        confirmed = [*leads, *(() if advice else leader.names)]
+        return get_effect(confirmed[0]).confirmed_by if confirmed else advice
+
+    def _record_entries(self, composition: Composition, alternatives: tuple[str, ...] = ()) -> list[NamedCause]:
+        """List the reported entries for the mistake in the record of an explanation, one for each affected test.
+
+        Args:
+            composition: the explanation.
+            alternatives: names of explanations that the tests cannot distinguish from this one.
+
+        Returns:
+            Entries with the sentence and the correction; none if the explanation has no mistake.
+        """
+        if (claim := composition.best.claim) is None:
+            return []
+        gain = self.search.base.chi_square - composition.best.state.plain.chi_square
+        why = f"lowers chi-square by {gain:.0f} without a new parameter; {probability_text(composition, self.finding)}"
+        singles = [replace(claim, tests=(index,)) for index in claim.tests] or [claim]
+        return [
+            NamedCause(
+                single.mistake.name,
+                why,
+                alternatives,
+                test=next((test.name for test in single.affected), None),
+                sentence=single.sentence,
+                correction=single.corrections[0],
+            )
+            for single in singles
+        ]
 
     def _build(
         self,
+        closing: Closing,
         summary: str,
-        after: Evidence,
         entries: Sequence[NamedCause] = (),
         remainder: Sequence[str] = (),
         *,
         verdict: Verdict | None = None,
         places: Hypothesis | None = None,
         next_test: str = "",
-        gap: GapDescription | None = None,
-        holdout: HoldOut | None = None,
-        known: Covariance | None = None,
     ) -> Diagnosis:
         """Build the diagnosis with regions, hold-out, candidates and the model to use.
 
         Args:
+            closing: model that closes the gap as far as possible.
             summary: verdict as a sentence.
-            after: fit with the additions, or the starting fit.
             entries: named effects or mistakes.
             remainder: names of the parts of the gap that the entries do not explain; empty if they explain it all.
             verdict: verdict in one word; None for the verdict of `finding`.
             places: hypothesis whose faulty parts of the tests are reported; None without any.
             next_test: advice on the next test; "" for the usual confirmation of the first entry.
-            gap: description of a gap without a name; None without one.
-            holdout: residuals of held-out tests, if they were computed before.
-            known: covariance of the effects' parameters that the fit `after` kept fixed; None without any.
         """
-        base, after = self._with_free_gains(self.request.base), self._with_free_gains(after)
-        verdict, bounds = verdict or self.finding.verdict, self.request.data.bounds
-        if not next_test and entries:
+        search, base, after, gap = self.search, self._with_free_gains(self.search.base), closing.fit, closing.gap
+        bounds, regions = search.data.bounds, find_regions(base)
+        faulty_parts = places.faulty_parts if places else ()
+        at_fault = [part.region(base.residual, places.change) for part in faulty_parts] if places else []
+        where = tuple(sorted((*at_fault, *regions), key=lambda region: -region.excess))
+        if faulty_parts:
+            next_test = f"measure again: {faulty_parts[0].name}"
+        elif not next_test and entries:
             next_test = get_effect(entries[0].name).confirmed_by
-        at_fault = list[MisfitRegion]()
-        for part in places.faulty_parts if places else ():
-            kind, component = ("loop", "force") if part.family == "loop" else ("sweep", "storage")
-            reading = f"{part.name}: a deviation of {number(100 * places.change, 2)} % from all other tests"  # type: ignore[union-attr]
-            excess = part.distance(base.residual)
-            at_fault.append(
-                MisfitRegion(part.direction, kind, part.frequency, part.amplitude, component, excess, reading)
-            )
-        if places and places.faulty_parts:
-            next_test = f"measure again: {places.faulty_parts[0].name}"
-        lacking = not (self.first and self.first.best.claim)
-        resolved, corrected = {*base.model.effects} - {*self.request.settings.unresolved}, gap.fitted if gap else None
-        regions = tuple(sorted((*at_fault, *find_regions(base)), key=lambda region: -region.excess))
+        fitted = result_of(
+            after,
+            bounds,
+            {*base.model.effects} - {*search.settings.unresolved},
+            lacking=not (self.first and self.first.best.claim),
+            corrected=gap.fitted if gap else None,
+            rig=search.data.campaign.rig,
+            fixed=closing.known,
+        )
         odds = explanation_odds(self.finding)
-        rig = self.request.data.campaign.rig
-        fitted = result_of(after, bounds, resolved, lacking=lacking, corrected=corrected, rig=rig, fixed=known)
         result = odds.averaged(fitted)
         amounts = filter(None, (_format_amount(entry.name, result) for entry in entries))
+        rest = [f"the rest: {' and '.join(remainder)}"] if remainder else []
         return Diagnosis(
-            verdict,
-            "; ".join([summary, *amounts, *([f"the rest: {' and '.join(remainder)}"] if remainder else [])]),
+            verdict or self.finding.verdict,
+            "; ".join([summary, *amounts, *rest]),
             tuple(entries),
-            regions,
-            regions if after is base else find_regions(after),
-            gap.holdout if gap else holdout or hold_out(base, after, bounds),
+            where,
+            where if after is base else find_regions(after),
+            gap.holdout if gap else closing.holdout or hold_out(base, after, bounds),
             next_test,
-            tuple(list_candidates(self.search, self.hypotheses, self.first)),
+            tuple(list_candidates(search, self.hypotheses, self.first)),
             base,
             after,
             result,
@@ -302,23 +365,12 @@ class DiagnosisWriter:
             odds,
         )
 
-    def _with_free_gains(self, evidence: Evidence) -> Evidence:
-        """Refit a model without the assumed gain error of loops; unchanged if the campaign states a gain error."""
-        loops = split_by_kind(evidence.data_sets)[0]
-        gain_is_stated = self.request.data.campaign.rig.stiffness_errors[0] is not None
-        if gain_is_stated or not any(loop.gain_weighs for loop in loops):
-            return evidence
-        if evidence not in self._refitted:
-            data_sets = with_gain_weighting(evidence.data_sets, weigh=False)
-            self._refitted[evidence] = fit(evidence.model, data_sets, evidence.fixed, self.request.data.bounds)
-        return self._refitted[evidence]
-
     def _notes(self) -> list[str]:
         """Sentences on the effects and kinds of fault that these tests cannot show."""
         unseen = [proposal.name for proposal in self.search.root.proposals if not proposal.visible]
         unseen = [name for name in unseen if not get_effect(name).depends_on]  # not those that need a stated condition
         notes = [f"not identifiable from these tests: {', '.join(unseen)}"] if unseen else []
-        directions = {str(test.direction) for test in self.request.base.data_sets}
+        directions = {str(test.direction) for test in self.search.base.data_sets}
         return [*notes, *([_ONE_DIRECTION] if self.first and self.first.unnamed and len(directions) == 1 else [])]
 
 

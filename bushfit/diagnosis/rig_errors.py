@@ -10,10 +10,10 @@ import numpy as np
 from scipy.special import chdtri, logsumexp
 
 from bushfit.campaign.schema import RigSettings
-from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.priors import COMPOUND, LEVELS, RUNS, WANDERING, WAVES, WITHIN_CLASS
 from bushfit.effects.contract import Array
 from bushfit.fitting.preparation import MeasuredSweep, group_repeats, split_by_kind, with_gain_weighting
+from bushfit.fitting.problem import FitResult
 from bushfit.fitting.rig_class import ASSUMED, class_errors
 
 #: Kinds of errors of the rig; the values are indices of `NoiseCase.errors`.
@@ -113,14 +113,14 @@ class RigErrors:
         return np.linalg.inv(root) * (errors * share)[..., None, :], log_det
 
 
-def in_scatter_units(evidence: Evidence) -> Evidence:
+def in_scatter_units(fit: FitResult) -> FitResult:
     """Express the residuals of a fit in units of the scatter from point to point, to compare hypotheses.
 
     Residuals of sweeps are differences of ln K (gain and phase), because a difference relative to the measurement would
     make noise appear smaller where the model is wrong.
 
     Args:
-        evidence: the fitted model and the tests.
+        fit: the fitted model and the tests.
 
     Returns:
         The same fit with the new residuals.
@@ -129,28 +129,28 @@ def in_scatter_units(evidence: Evidence) -> Evidence:
         replace(data_set, noise=replace(data_set.noise, shared=(0.0, 0.0), level=(0.0, 0.0)), residuals="complex")
         if isinstance(data_set, MeasuredSweep)
         else data_set
-        for data_set in with_gain_weighting(evidence.data_sets, weigh=False)
+        for data_set in with_gain_weighting(fit.data_sets, weigh=False)
     )
-    return Evidence(evidence.solution.reevaluate(evidence.model, data_sets))
+    return fit.reevaluate(fit.model, data_sets)
 
 
-def rig_errors(evidence: Evidence, rig: RigSettings) -> RigErrors:
+def rig_errors(fit: FitResult, rig: RigSettings) -> RigErrors:
     """Errors of a rig in the fitted tests, at the sizes of the accuracy class that [rig] states."""
-    return RigErrors(list(error_blocks(evidence, rig)), noise_cases(evidence))
+    return RigErrors(list(error_blocks(fit, rig)), noise_cases(fit))
 
 
-def noise_cases(evidence: Evidence) -> list[NoiseCase]:
+def noise_cases(fit: FitResult) -> list[NoiseCase]:
     """List the assumptions on the sizes of the rig's errors and of the compound's deviation.
 
     The point-to-point scatter has several sizes if it was estimated from few repeats.
 
     Args:
-        evidence: the fitted model and the tests.
+        fit: the fitted model and the tests.
 
     Returns:
         Noise cases, whose prior probabilities sum to one.
     """
-    sweeps = split_by_kind(evidence.data_sets)[1]
+    sweeps = split_by_kind(fit.data_sets)[1]
     freedom = max((sweep.noise.scatter_freedom for sweep in sweeps), default=0)
     thirds = (np.arange(3) + 0.5) / 3
     scatters = np.sqrt(freedom / chdtri(freedom, 1.0 - thirds)).tolist() if 0 < freedom < _KNOWN else [1.0]
@@ -166,20 +166,20 @@ def noise_cases(evidence: Evidence) -> list[NoiseCase]:
     return [replace(case, log_weight=float(case.log_weight - total)) for case in unnormalised]
 
 
-def error_blocks(evidence: Evidence, rig: RigSettings) -> Iterator[Block]:
+def error_blocks(fit: FitResult, rig: RigSettings) -> Iterator[Block]:
     """List the sets of residual rows that share errors: the gain or phase of a level of a sweep, or repeated loops.
 
     Args:
-        evidence: the fitted model and the tests.
+        fit: the fitted model and the tests.
         rig: stated accuracy class of the rig (gain and phase errors).
 
     Yields:
         Blocks that together contain every row once.
     """
-    loops, sweeps = split_by_kind(evidence.data_sets)
+    loops, sweeps = split_by_kind(fit.data_sets)
     classes = class_errors(rig, ASSUMED)
     for sweep in sweeps:
-        first, count = evidence.residual_rows[sweep].start, sweep.frequency.size
+        first, count = fit.residual_rows[sweep].start, sweep.frequency.size
         runs = np.split(np.arange(count), sweep.block_starts[1:])
         units = sweep.whiten(np.full(count, 1.0 + 1.0j)).reshape(2, count)
         for level in np.unique(sweep.held_value):
@@ -190,7 +190,7 @@ def error_blocks(evidence: Evidence, rig: RigSettings) -> Iterator[Block]:
                 yield Block(first + part * count + line, unit_class * columns * units[part, line], kinds, scatters=True)
     for group in group_repeats(loops):
         rows = np.concatenate(
-            [np.arange(evidence.residual_rows[loop].start, evidence.residual_rows[loop].stop) for loop in group]
+            [np.arange(fit.residual_rows[loop].start, fit.residual_rows[loop].stop) for loop in group]
         )
         gain = classes[0] * np.concatenate([loop.gain_and_offset()[0] for loop in group])
         yield Block(rows, gain[None], np.array([_LOOP]), scatters=False)

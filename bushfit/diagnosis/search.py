@@ -7,27 +7,29 @@ without a name comes from a linear model.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from itertools import product
 from math import log
 
 import numpy as np
 
 from bushfit.diagnosis.claims import ClaimScreening, claims
-from bushfit.diagnosis.evidence import Evidence
-from bushfit.diagnosis.explanations import COMPOUND, Explanation, FaultyPart
-from bushfit.diagnosis.hypotheses import DiagnosisRequest, Hypothesis, SearchState
+from bushfit.diagnosis.explanations import Explanation
+from bushfit.diagnosis.faulty_parts import FaultyPart, OutlierCluster
+from bushfit.diagnosis.fits import fit_rivals
+from bushfit.diagnosis.hypotheses import Hypothesis, SearchState
 from bushfit.diagnosis.priors import BEAM, DOES_NOT_FIT, LOG_ODDS_CUTOFF, NAMED, ODDS, REFITS, ROUNDS
 from bushfit.diagnosis.propose import has_used_parameters
-from bushfit.diagnosis.recorded_tests import Tests
-from bushfit.diagnosis.refit import refitted
-from bushfit.diagnosis.rig_errors import in_scatter_units
+from bushfit.diagnosis.record import DiagnosisSettings
+from bushfit.diagnosis.recorded_tests import RecordedTests
+from bushfit.diagnosis.smooth_deviations import COMPOUND
 from bushfit.diagnosis.verdict import decide_verdict
-from bushfit.effects.contract import Array
 from bushfit.effects.mistakes import USUAL_MODULUS, get_mistake
 from bushfit.errors import FitError, ModelError
+from bushfit.fitting.prepared_campaign import PreparedCampaign
+from bushfit.fitting.problem import FitResult
 from bushfit.geometry import stiffness_per_modulus
 from bushfit.model.model import Model
 from bushfit.progress import track
@@ -46,23 +48,39 @@ _RECORDED = ("measured", "amplitude", "frequency")
 _BENT = 1.5
 
 
+@dataclass(eq=False)
 class Search:
     """Beam search over sets of explanations of the gap between a fitted model and the tests.
 
     A state of the search is a model fitted with some explanations; the search extends the most probable states.
+
+    Args:
+        data: campaign with the prepared tests.
+        base: starting model, fitted to the tests.
+        fit_corrected: function that fits the starting model to a campaign with a corrected record.
+        settings: limits of the diagnosis, and effects and mistakes not to consider.
+        start: starting values read from the data, by parameter, for a fit that the gap has distorted.
+        outlier_clusters: frequencies at which several outliers were left out.
     """
 
-    def __init__(self, request: DiagnosisRequest) -> None:
-        self.request = request
-        self._known: dict[frozenset[Hashable], Hypothesis] = {}
-        self._visited: set[frozenset[Hashable]] = set()
-        settings, rig = request.settings, request.data.campaign.rig
+    data: PreparedCampaign
+    base: FitResult
+    fit_corrected: Callable[[PreparedCampaign], FitResult]
+    settings: DiagnosisSettings
+    start: Mapping[str, float]
+    outlier_clusters: Sequence[OutlierCluster]
+    _known: dict[frozenset[Hashable], Hypothesis] = field(default_factory=dict)
+    _visited: set[frozenset[Hashable]] = field(default_factory=set)
+
+    def __post_init__(self) -> None:
+        settings = self.settings
         adopted = sum(get_mistake(name) is None for name in settings.adopt)
         limit = max(settings.max_effects - adopted, min(settings.max_effects, 1))
-        tests = Tests(request.base, rig, settings.without, log(1.0 - sum(ODDS.values())), max_effects=limit)
+        log_prior = log(1.0 - sum(ODDS.values()))
+        tests = RecordedTests(self.base, self.data.campaign.rig, settings.without, log_prior, max_effects=limit)
         self.root = SearchState.of_tests(tests)
         self._log_priors = prior_odds([*self.root.proposals, *tests.explanations])
-        families = {e.family for e in (*request.outlier_clusters, *tests.explanations) if e.kind == "part"}
+        families = {e.family for e in (*self.outlier_clusters, *tests.explanations) if e.kind == "part"}
         self._meeting_odds = log(ODDS["part"] / max(len(families), 1)) - tests.log_prior
 
     def run(self) -> list[Hypothesis]:
@@ -81,7 +99,7 @@ class Search:
                 break
             fresh = list[SearchState]()
             for state in track("with one more", beam):
-                by_evidence, by_score = REFITS[1 if depth else 2 if state.evidence.reduced_chi_square > _BENT else 0]
+                by_evidence, by_score = REFITS[1 if depth else 2 if state.plain.reduced_chi_square > _BENT else 0]
                 for grown in self._with_effects(state, self._promising(state, by_evidence, by_score), depth):
                     fresh += [grown, *self._without_earlier(grown)]
                 fresh += self._with_faulty_parts(state, depth)
@@ -103,7 +121,7 @@ class Search:
 
     def _is_sure(self) -> bool:
         """True if the search can stop: one explanation, or none missing, is nearly certain and fits the tests."""
-        finding = decide_verdict(self._ordered(), self.request.settings.tolerance)
+        finding = decide_verdict(self._ordered(), self.settings.tolerance)
         if finding.verdict == "consistent":
             return finding.nothing >= NAMED and self.root.linear.p_value() >= DOES_NOT_FIT
         return finding.verdict == "named" and finding.reported[0].best.refitted
@@ -146,9 +164,9 @@ class Search:
         stays.
         """
         candidates = list(hypotheses)
-        for hypothesis, part in product(hypotheses, self.request.outlier_clusters):
+        for hypothesis, part in product(hypotheses, self.outlier_clusters):
             log_posterior = hypothesis.log_posterior + self._meeting_odds + part.log_odds
-            if hypothesis.change <= self.request.settings.tolerance:  # what is that small is no part of an explanation
+            if hypothesis.change <= self.settings.tolerance:  # what is that small is no part of an explanation
                 hypothesis = self.root.hypotheses[0]
             change, clusters = max(hypothesis.change, part.size), (*hypothesis.clusters, part)
             candidates.append(replace(hypothesis, clusters=clusters, log_posterior=log_posterior, change=change))
@@ -193,21 +211,21 @@ class Search:
         if not names or not state.may_grow:
             return []
         models = {proposal.name: proposal.model for proposal in state.proposals if proposal.name in names}
-        start = self.request.start if not state.effects and state.evidence.reduced_chi_square > _BENT else {}
+        start = self.start if not state.effects and state.plain.reduced_chi_square > _BENT else {}
         grown: dict[str, SearchState] = {}
         for deviation in dict.fromkeys((state.likeliest_deviation, 0.0)):
-            for name, evidence in self._refitted(state, models, start, state.free_columns(deviation)):
-                candidate = self._visit(state.with_effect(name, evidence, self._log_odds("effect", name, depth)))
+            for name, fit in self._refit(state, models, start, deviation).items():
+                candidate = self._visit(state.with_effect(name, fit, self._log_odds("effect", name, depth)))
                 if name not in grown or candidate.log_posterior > grown[name].log_posterior:
                     grown[name] = candidate
         return list(grown.values())
 
-    def _refitted(
-        self, state: SearchState, models: Mapping[str, Model], start: Mapping[str, float], columns: Array | None = None
-    ) -> Iterable[tuple[str, Evidence]]:
-        """Fit models to the tests of a state; see `refit.refitted`."""
-        base, bounds = self.request.base, self.request.data.bounds
-        return refitted(state.evidence, models, start, base.fixed, bounds, columns).items()
+    def _refit(
+        self, state: SearchState, models: Mapping[str, Model], start: Mapping[str, float], deviation: float | None
+    ) -> dict[str, FitResult]:
+        """Fit models to the tests of a state, with its faults and the compound's deviation free; None: without."""
+        columns = None if deviation is None else state.free_columns(deviation)
+        return fit_rivals(models, state.fit.data_sets, start, self.base.fixed, self.data.bounds, columns)
 
     def _with_faulty_parts(self, state: SearchState, depth: int) -> Iterator[SearchState]:
         """Extend a state by each of its likeliest faulty parts of the tests, with a common shift or an error per point.
@@ -235,35 +253,34 @@ class Search:
                 amounts=(*state.amounts, worth.likeliest),
                 change=max(state.change, worth.size),
             )
-            if grown.evidence.reduced_chi_square > _BENT:  # perhaps by the part
-                models, columns = {"": grown.evidence.model}, grown.free_columns(0.0)
-                starts = [{}] if grown.effects else [{}, self.request.start]
-                fits = [fit for start in starts for _, fit in self._refitted(grown, models, start, columns)]
-                evidence = min(fits, key=lambda fit: (fit.joint or fit.solution).chi_square, default=grown.evidence)
-                grown = replace(grown, evidence=evidence, bare=in_scatter_units(evidence))
+            if grown.plain.reduced_chi_square > _BENT:  # perhaps by the part
+                starts = [{}] if grown.effects else [{}, self.start]
+                refits = [self._refit(grown, {"": grown.fit.model}, start, 0.0) for start in starts]
+                fits = [fit for by_name in refits for fit in by_name.values()]
+                grown = replace(grown, fit=min(fits, key=lambda fit: fit.chi_square, default=grown.fit))
             yield self._visit(grown)
 
     def _without_earlier(self, state: SearchState) -> Iterator[SearchState]:
         """Yield for each earlier effect, which the last may make unnecessary, the refitted state without it."""
         earlier = () if state.faulty_parts else state.effects[:-1]
-        shorter = {name: state.evidence.model.without(name) for name in earlier}
+        shorter = {name: state.fit.model.without(name) for name in earlier}
         for name, model in shorter.items():
             if state.key - {name} in self._visited or not all(has_used_parameters(e, model) for e in model.records):
                 continue
-            for _, evidence in self._refitted(state, {name: model}, {}):
-                yield self._visit(self._with_fit(state, [e for e in state.effects if e != name], evidence))
+            for fit in self._refit(state, {name: model}, {}, None).values():
+                yield self._visit(self._with_fit(state, [e for e in state.effects if e != name], fit))
 
-    def _with_fit(self, state: SearchState, effects: Sequence[str], evidence: Evidence) -> SearchState:
+    def _with_fit(self, state: SearchState, effects: Sequence[str], fit: FitResult) -> SearchState:
         """Build the state of the search with these effects from a fit of all of them.
 
         Args:
             state: state with the tests.
             effects: names of the effects, added one after the other.
-            evidence: fit with all effects.
+            fit: fit with all effects.
         """
-        fitted = replace(SearchState.of_tests(state.tests), evidence=evidence, bare=in_scatter_units(evidence))
+        fitted = replace(SearchState.of_tests(state.tests), fit=fit)
         for order, name in enumerate(effects):
-            fitted = fitted.with_effect(name, evidence, self._log_odds("effect", name, order))
+            fitted = fitted.with_effect(name, fit, self._log_odds("effect", name, order))
         return fitted
 
     def _with_common_start(self, states: list[SearchState]) -> list[SearchState]:
@@ -282,38 +299,36 @@ class Search:
         near = [n for n, state in enumerate(states) if state is not leader and not state.faulty_parts]
         near.sort(key=lambda n: -states[n].log_posterior)
         for n in near[:_RIVALS] if leader.likeliest_deviation and not leader.faulty_parts else ():
-            state, start = states[n], leader.evidence.model.values
-            columns = state.free_columns(leader.likeliest_deviation)
-            for _, evidence in self._refitted(state, {"": state.evidence.model}, start, columns):
-                candidate = self._visit(self._with_fit(state, state.effects, evidence))
+            state, start = states[n], leader.fit.model.values
+            for fit in self._refit(state, {"": state.fit.model}, start, leader.likeliest_deviation).values():
+                candidate = self._visit(self._with_fit(state, state.effects, fit))
                 states[n] = max(state, candidate, key=lambda rival: rival.log_posterior)
         return states
 
     def _corrected_records(self) -> Iterator[SearchState]:
         """Generate the states with one mistake in the record corrected, the most promising mistake first."""
-        data, base = self.request.data, self.request.base
-        possible = claims(data, self.request.settings.without)
-        for claim in track("mistakes put right", list(ClaimScreening(data).best(possible, _CLAIMS))):
+        possible = claims(self.data, self.settings.without)
+        for claim in track("mistakes put right", list(ClaimScreening(self.data).best(possible, _CLAIMS))):
             with suppress(FitError, ModelError):  # corrected tests that nothing can be fitted to
-                evidence = self.request.fit_corrected(claim.corrected())
-                if [test.size for test in evidence.data_sets] == [test.size for test in base.data_sets]:
-                    odds = log(ODDS["record"]) - log(len(possible)) - 0.5 * _modulus_deviation(evidence) ** 2
-                    change = _record_change(base, evidence)
-                    tests = replace(self.root.tests, base=evidence, log_prior=odds, claim=claim, change=change)
+                fit = self.fit_corrected(claim.corrected())
+                if [test.size for test in fit.data_sets] == [test.size for test in self.base.data_sets]:
+                    odds = log(ODDS["record"]) - log(len(possible)) - 0.5 * _modulus_deviation(fit) ** 2
+                    change = _record_change(self.base, fit)
+                    tests = replace(self.root.tests, base=fit, log_prior=odds, claim=claim, change=change)
                     yield self._visit(SearchState.of_tests(tests))
 
 
-def _modulus_deviation(evidence: Evidence) -> float:
+def _modulus_deviation(fit: FitResult) -> float:
     """Deviation of the median shear modulus of the tests from that of bushing rubber, in standard deviations."""
     moduli = [
-        np.median(np.abs(test.measured)) / stiffness_per_modulus(evidence.model.bushing, test.direction)
-        for test in evidence.data_sets
+        np.median(np.abs(test.measured)) / stiffness_per_modulus(fit.model.bushing, test.direction)
+        for test in fit.data_sets
     ]
     typical, spread = USUAL_MODULUS
     return float(np.log(np.median(moduli) / typical)) / spread
 
 
-def _record_change(base: Evidence, corrected: Evidence) -> float:
+def _record_change(base: FitResult, corrected: FitResult) -> float:
     """Largest relative change of a recorded stiffness (complex), amplitude or frequency in a correction of the record.
 
     The value is 1 if the dimensions of the bushing or the direction of a test are corrected.

@@ -12,15 +12,19 @@ import numpy as np
 from scipy.special import logsumexp
 
 from bushfit.diagnosis.document import Verdict
-from bushfit.diagnosis.explanations import COMPOUND, FaultyPart, OutlierCluster, is_pattern
+from bushfit.diagnosis.faulty_parts import FaultyPart, OutlierCluster, is_pattern
 from bushfit.diagnosis.hypotheses import Hypothesis
 from bushfit.diagnosis.priors import DOES_NOT_FIT, LEAST_NAMED_SHARE, MOST_REPORTED, NAMED, NOTHING
+from bushfit.diagnosis.smooth_deviations import COMPOUND
 from bushfit.effects import get_effect
 from bushfit.effects.contract import Level
 
 #: Part of an explanation: its kind ("effect", "mistake", "unnamed", or `_FAULT` and the kind of a fault), and its name.
 _Part = tuple[str, Any]
 _FAULT = "fault: "
+#: Texts for the parts of an explanation that are no known effect.
+NAMELESS = "something without a name"
+LEVELS = "errors of levels beyond the class of the rig"
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +48,17 @@ class Composition:
     def faulty_parts(self) -> tuple[FaultyPart, ...]:
         """Faulty parts of the tests; empty if they form a pattern that may be physics without a name."""
         return () if is_pattern(self.best.faulty_parts) else self.best.faulty_parts
+
+    @property
+    def label(self) -> str:
+        """Names of the mistake (as --adopt accepts it), effects, faults and nameless parts, joined by +."""
+        claim, faults = self.best.claim, (f"fault: {part.name}" for part in self.faulty_parts)
+        return " + ".join((*(claim.labels if claim else ()), *self.names, *faults, *self.nameless))
+
+    @property
+    def nameless(self) -> tuple[str, ...]:
+        """Texts for the parts that are not known effects: level errors, and unnamed smooth curves."""
+        return (*([LEVELS] if self.best.levels else []), *([NAMELESS] if self.unnamed else []))
 
     @property
     def causes(self) -> tuple[str, ...]:

@@ -9,9 +9,8 @@ from functools import partial
 
 from bushfit.diagnosis.claims import ClaimScreening, claims, correct_adopted
 from bushfit.diagnosis.condense import shorten_tests
-from bushfit.diagnosis.evidence import EVALUATIONS, Evidence
-from bushfit.diagnosis.explanations import outlier_clusters
-from bushfit.diagnosis.hypotheses import DiagnosisRequest
+from bushfit.diagnosis.faulty_parts import outlier_clusters
+from bushfit.diagnosis.fits import EVALUATIONS
 from bushfit.diagnosis.record import Diagnosis, DiagnosisSettings
 from bushfit.diagnosis.report_text import DiagnosisWriter
 from bushfit.diagnosis.search import Search
@@ -23,7 +22,7 @@ from bushfit.errors import FitError
 from bushfit.fitting.descent import Descent
 from bushfit.fitting.preparation import split_by_kind, with_gain_weighting
 from bushfit.fitting.prepared_campaign import PreparedCampaign
-from bushfit.fitting.problem import FitProblem
+from bushfit.fitting.problem import FitProblem, FitResult
 from bushfit.fitting.robust import estimate, list_outliers, outlier_warnings
 from bushfit.geometry import get_places
 from bushfit.model.model import Model
@@ -78,7 +77,7 @@ def diagnose(
     if reductions:
         base, start, outliers = refit(data)
     clusters = outlier_clusters(excluded, whole.sweeps, base.model)
-    search = Search(DiagnosisRequest(data, base, lambda mended: refit(mended)[0], settings, start, clusters))
+    search = Search(data, base, lambda mended: refit(mended)[0], settings, start, clusters)
     hypotheses = search.run()
     finding = decide_verdict(hypotheses, settings.tolerance)
     diagnosis = DiagnosisWriter(search, finding, hypotheses).diagnosis()
@@ -103,7 +102,7 @@ def diagnose(
 
 def _initial_fit(
     data: PreparedCampaign, model: Model | None, settings: DiagnosisSettings, fixed: Sequence[str]
-) -> tuple[Evidence, dict[str, float], tuple[Outlier, ...]]:
+) -> tuple[FitResult, dict[str, float], tuple[Outlier, ...]]:
     """Fit the starting model with the adopted effects; gain errors of loops have the stated or an assumed class.
 
     Args:
@@ -135,4 +134,4 @@ def _initial_fit(
         outliers, data_sets = robust.outliers, robust.data_sets
     data_sets = [data_set.with_weight() for data_set in with_gain_weighting(data_sets, weigh=True)]
     descent = Descent.start(FitProblem.with_fixed(model, data_sets, fixed, data.bounds)).run(EVALUATIONS)
-    return Evidence(descent.solution), start, outliers
+    return descent.solution, start, outliers

@@ -11,7 +11,7 @@ import numpy as np
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError
 from bushfit.fitting.coordinates import ROUNDING, Bounds, Coordinates, coordinate_bounds, prior_rows
-from bushfit.fitting.preparation import MeasuredTest
+from bushfit.fitting.preparation import MeasuredTest, residual_slices
 from bushfit.fitting.shared_errors import SharedErrors
 from bushfit.model.covariance import Z95
 from bushfit.model.model import Model
@@ -186,6 +186,16 @@ class FitResult:
         """Tests weighted by their noise alone, for quality and warnings; excluded outliers have weight 0."""
         return self.noise_weighted or self.problem.tests
 
+    @cached_property
+    def residual_rows(self) -> Mapping[MeasuredTest, slice]:
+        """Slice of the residuals of each test in `residual`."""
+        return dict(zip(self.data_sets, residual_slices(self.data_sets), strict=True))
+
+    @property
+    def fixed(self) -> list[str]:
+        """Names of the parameters that the fit kept at their values."""
+        return [name for name in self.model.values if name not in self.names]
+
     def stage(self, fixed: Collection[str] = ()) -> FitProblem:
         """Problem of this fit for `covariance`, with the weights of its tests; the `fixed` parameters are not free."""
         names = [name for name in self.names if name not in fixed]
@@ -195,6 +205,17 @@ class FitResult:
     def chi_square(self) -> float:
         """Chi-square: sum of the squared whitened residuals."""
         return float(self.residual @ self.residual)
+
+    @property
+    def mean_square(self) -> float:
+        """Mean square of the residuals of the tests, in squared units of noise."""
+        return self.chi_square / max(sum(test.residual_count for test in self.data_sets), 1)
+
+    @property
+    def reduced_chi_square(self) -> float:
+        """Chi-square per degree of freedom; 1 if the residuals are noise alone."""
+        count = sum(test.residual_count for test in self.data_sets)
+        return self.chi_square / max(count - len(self.names), 1)
 
     @property
     def moving(self) -> list[int]:

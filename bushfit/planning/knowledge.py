@@ -9,16 +9,16 @@ import numpy as np
 
 from bushfit.campaign.schema import RigSettings
 from bushfit.campaign.simulated import SimulatedLoop, SimulatedSweep
-from bushfit.diagnosis.evidence import Evidence, fit, result_of
+from bushfit.diagnosis.fits import fit_model, fit_rivals, result_of
 from bushfit.diagnosis.propose import proposals
 from bushfit.diagnosis.record import Diagnosis
-from bushfit.diagnosis.refit import refitted
 from bushfit.diagnosis.workflow import diagnose
 from bushfit.effects import LIBRARY, get_effect, twins_of
 from bushfit.errors import ModelError, did_you_mean
 from bushfit.fitting.coordinates import Bounds, Coordinates, relative_sizes
 from bushfit.fitting.preparation import MeasuredTest, split_by_kind
 from bushfit.fitting.prepared_campaign import PreparedCampaign
+from bushfit.fitting.problem import FitResult
 from bushfit.fitting.rig_class import class_errors
 from bushfit.model.result import Result
 from bushfit.planning.contract import Knowledge, Noise, Test
@@ -75,14 +75,14 @@ def from_campaign(data: PreparedCampaign, rivals: Sequence[str] | None = None) -
     fixed = [name for name in model.parameters if name not in data.free(tuple(model.parameters))]
     source = f"the tests of {data.campaign.name}"
 
-    def knowledge(evidence: Evidence) -> Knowledge:
-        result = replace(result_of(evidence, data.bounds, ()), specimens=data.campaign.specimens)
+    def knowledge(fit: FitResult) -> Knowledge:
+        result = replace(result_of(fit, data.bounds, ()), specimens=data.campaign.specimens)
         plain = replace(from_result(result, noise, source), tests=tuple(_campaign_runs(data)))
-        bounded = tuple(name for name in evidence.solution.at_bound if name not in plain.names)
+        bounded = tuple(name for name in fit.at_bound if name not in plain.names)
         return _with_bounded_parameters(plain, bounded, data_sets) if bounded else plain
 
     if diagnosis is None or rivals is None:
-        return knowledge(fit(model, data_sets, fixed, data.bounds))
+        return knowledge(fit_model(model, data_sets, fixed, data.bounds))
     sets = undecided_effects(diagnosis)
     names = list(dict.fromkeys(twins_of(name)[0] for name in rivals or next(iter(sets), ())))
     if not names:
@@ -95,7 +95,7 @@ def from_campaign(data: PreparedCampaign, rivals: Sequence[str] | None = None) -
         )
     certain = [name for name in diagnosis.result.model.effects if name not in model.effects]
     leaders = [effects[0] for effects in sets if not {*names} & {*effects}]
-    plain = fit(model, data_sets, fixed, data.bounds)
+    plain = fit_model(model, data_sets, fixed, data.bounds)
     for name in (*certain, *leaders):
         if name not in names:
             plain = _add_effects(plain, [name], fixed, data.bounds).get(name, plain)
@@ -153,7 +153,7 @@ def _with_bounded_parameters(
     return replace(knowledge, bounded=tuple(np.array(bounded)[is_visible].tolist()), covariance=covariance)
 
 
-def _add_effects(plain: Evidence, names: Sequence[str], fixed: Sequence[str], bounds: Bounds) -> dict[str, Evidence]:
+def _add_effects(plain: FitResult, names: Sequence[str], fixed: Sequence[str], bounds: Bounds) -> dict[str, FitResult]:
     """Fit the model with each effect added in turn.
 
     Args:
@@ -167,7 +167,7 @@ def _add_effects(plain: Evidence, names: Sequence[str], fixed: Sequence[str], bo
         Effects without influence on these tests are omitted.
     """
     models = {proposal.name: proposal.model for proposal in proposals(plain, (), fixed) if proposal.name in names}
-    fits = refitted(plain, models, {}, fixed, bounds)
+    fits = fit_rivals(models, plain.data_sets, {}, fixed, bounds)
     for name in names:
         needed = get_effect(name).after
         if name not in fits and needed and needed not in plain.model.effects:

@@ -8,12 +8,13 @@ from rigged import PLAN, SHARED, Diagnosed, Effects, Fitted, Measured
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.simulated import SimulateSettings
-from bushfit.diagnosis.evidence import Evidence, fit
+from bushfit.diagnosis.fits import fit_model
 from bushfit.diagnosis.record import Diagnosis, DiagnosisSettings
 from bushfit.diagnosis.rig_errors import in_scatter_units
 from bushfit.diagnosis.workflow import diagnose
 from bushfit.effects import BASE, get_effect
 from bushfit.fitting.prepared_campaign import PreparedCampaign
+from bushfit.fitting.problem import FitResult
 from bushfit.fitting.starts import start_values
 from bushfit.model.model import Model
 from bushfit.simulation.measured import measure
@@ -65,18 +66,18 @@ def diagnosed(measured) -> Diagnosed:
 def fitted() -> Fitted:
     """fitted(campaign, *effects): the paper's model and more, fitted to all tests of a campaign."""
 
-    def evidence(campaign: Campaign, *effects: str) -> Evidence:
+    def evidence(campaign: Campaign, *effects: str) -> FitResult:
         data = PreparedCampaign.from_campaign(campaign)
         data_sets = [*data.loops, *data.sweeps]
         start = start_values(campaign.bushing, data_sets, {})
         gone = {get_effect(name).replaces for name in effects}
         kept = [name for name in BASE if name not in gone]
-        return fit(Model.with_defaults(campaign.bushing, (*kept, *effects), start), data_sets, (), {})
+        return fit_model(Model.with_defaults(campaign.bushing, (*kept, *effects), start), data_sets, (), {})
 
     return evidence
 
 
 @pytest.fixture(scope="session")
-def bare(measured, fitted) -> Evidence:
+def bare(measured, fitted) -> FitResult:
     """The paper's model fitted to a clean campaign, its residuals in units of what scatters from point to point."""
     return in_scatter_units(fitted(measured(plan=SHARED)))

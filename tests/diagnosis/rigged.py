@@ -7,12 +7,12 @@ import numpy as np
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.simulated import SimulatedLoop, SimulatedSweep, SimulateSettings
-from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.record import Diagnosis, DiagnosisSettings
 from bushfit.diagnosis.workflow import diagnose
 from bushfit.effects.contract import Array
 from bushfit.effects.history import History
 from bushfit.fitting.prepared_campaign import PreparedCampaign
+from bushfit.fitting.problem import FitResult
 from bushfit.geometry import Direction
 from bushfit.model.model import Model
 from bushfit.reading.measurement import Loop, Sweep
@@ -36,7 +36,7 @@ SHARED = replace(PLAN, gain_error=4e-3, phase_error=3.5e-3)
 Effects = Mapping[str, Mapping[str, float]]
 Measured = Callable[..., Campaign]
 Diagnosed = Callable[..., Diagnosis]
-Fitted = Callable[..., Evidence]
+Fitted = Callable[..., FitResult]
 Tamper = Callable[[Campaign], Campaign]
 INERTIA = {"inertia": {"mass": 0.06}}
 SLIP = {"interface_slip": {"force": 6.0}}

@@ -20,11 +20,11 @@ from test_schemas import complaints
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.described import GapDescription, describe
-from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.power_law import PowerLaw, Term, nearest_power_law
 from bushfit.effects.contract import Array, Level, Setting
 from bushfit.effects.unnamed import Patch, Unnamed
 from bushfit.fitting.prepared_campaign import PreparedCampaign
+from bushfit.fitting.problem import FitResult
 from bushfit.fitting.starts import start_values
 from bushfit.geometry import Direction, stiffness_per_modulus, unit_strain
 from bushfit.model.file import from_document, to_document
@@ -56,7 +56,7 @@ def with_relaxation(campaign: Campaign, size: float = 0.06) -> Campaign:
 
 
 @pytest.fixture(scope="module")
-def evidence(measured, fitted) -> Evidence:
+def evidence(measured, fitted) -> FitResult:
     return fitted(with_relaxation(measured()))
 
 
@@ -263,7 +263,7 @@ def test_derivatives_beside_a_large_term(residuals, measure, measured, fitted):
     term, model = Term(evidence, measure), evidence.model
     value = (0.06 + 0.08j) * np.exp(term.points @ (0.5, 0.1))
     value *= np.mean(np.abs(term.stiffness(model) / term.unit(model)))
-    coordinates, step = evidence.solution.coordinates, 1e-5
+    coordinates, step = evidence.coordinates, 1e-5
     middle = coordinates.point(model.values)
     _, rows, columns = term.linearised(model, value, value[None])
     for row, own in zip(rows, np.eye(middle.size) * step, strict=True):

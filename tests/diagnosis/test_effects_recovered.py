@@ -126,14 +126,14 @@ def families(model: Model, truth: str, values: Mapping[str, float]) -> dict[str,
 def test_the_family_that_made_the_tests_is_the_best_and_known_to_be(paper_model, truth):
     found = families(paper_model, truth, TRUTHS[truth])
     assert list(found) == ["paper", *NAMES]
-    assert found[truth].evidence.reduced_chi_square == pytest.approx(1.0, abs=0.05)
-    assert min(found, key=lambda name: found[name].evidence.bic) == truth
+    assert found[truth].fit.reduced_chi_square == pytest.approx(1.0, abs=0.05)
+    assert min(found, key=lambda name: found[name].bic) == truth
     assert sum(family.probability for family in found.values()) == pytest.approx(1.0)
     assert found[truth].probability > 0.5
     assert found[truth].holdout.after == pytest.approx(1.0, abs=0.05)
     if truth != "paper":
         assert found[truth].words.endswith("better by more than chance")
-        values = found[truth].evidence.model.values
+        values = found[truth].fit.model.values
         for key, value in TRUTHS[truth].items():
             assert values[f"{truth}.{key}"] == pytest.approx(value, rel=0.1)
     else:

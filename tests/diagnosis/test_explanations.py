@@ -11,25 +11,26 @@ import pytest
 from rigged import LEVELS, SHARED, both, loop_too_strong, off
 
 from bushfit.campaign.schema import RigSettings
-from bushfit.diagnosis.evidence import Evidence
-from bushfit.diagnosis.explanations import Explanation, compound, compound_shapes, is_pattern
-from bushfit.diagnosis.faulty_parts import find_faulty_parts
+from bushfit.diagnosis.explanations import Explanation
+from bushfit.diagnosis.faulty_parts import find_faulty_parts, is_pattern
 from bushfit.diagnosis.linear_model import LinearModel
-from bushfit.diagnosis.propose import proposals, scores, sensitivity
+from bushfit.diagnosis.propose import parameter_basis, proposals, scores, sensitivity
 from bushfit.diagnosis.rig_errors import in_scatter_units, rig_errors
+from bushfit.diagnosis.smooth_deviations import compound, compound_shapes
 from bushfit.effects import BASE, LIBRARY
 from bushfit.fitting.preparation import split_by_kind
+from bushfit.fitting.problem import FitResult
 from bushfit.geometry import Direction
 
 SHARED_RIG = RigSettings(gain_error=4e-3, phase_error=3.5e-3)
 
 
-def best(evidence: Evidence, every: Sequence[Explanation]) -> Explanation:
+def best(evidence: FitResult, every: Sequence[Explanation]) -> Explanation:
     """The one that makes the tests likeliest."""
     known = [each for each in every if each.group]
     groups = [each.group for each in known if each.group]
     rig = rig_errors(evidence, SHARED_RIG)
-    solution = evidence.solution
+    solution = evidence
     precision = np.zeros(len(solution.jacobian))
     worths = LinearModel(solution.residual, solution.jacobian, precision, rig, groups).group_evidence
     return max(zip(known, worths, strict=True), key=lambda pair: pair[1].log_evidence)[0]
@@ -74,11 +75,10 @@ def test_every_effect_is_proposed_but_twins_and_what_the_tests_do_not_state(bare
 def test_scores_are_those_of_a_linear_refit(bare):
     """Chi-square of the residual regressed on the model's Jacobian, less that on Jacobian and column."""
     random = np.random.default_rng(0)
-    residual, own = random.standard_normal(bare.residual.size), bare.solution.jacobian
-    evidence = replace(bare, solution=replace(bare.solution, residual=residual))
+    residual, own = random.standard_normal(bare.residual.size), bare.jacobian
     columns = random.standard_normal((3, residual.size)) * np.array([[1e-3], [1.0], [1e3]])
     before = np.linalg.lstsq(own.T, residual, rcond=None)[1]
-    for column, gain, amount, seen in zip(columns, *scores(evidence, columns), strict=True):
+    for column, gain, amount, seen in zip(columns, *scores(columns, residual, parameter_basis(own)), strict=True):
         answer, after, *_ = np.linalg.lstsq(np.vstack((own, column)).T, residual, rcond=None)
         assert seen
         assert gain == pytest.approx(float((before - after)[0]), rel=1e-6)
@@ -92,7 +92,7 @@ def test_beside_a_compound_that_deviates_the_strain_of_each_direction_is_inexact
     change *= 5.0 / LIBRARY["strain_scale.radial"].amount.typical
     assert np.linalg.norm(columns[:, : change.size] - change, axis=1).min() < 0.02 * np.linalg.norm(change)
     axial = tuple(test for test in bare.data_sets if test.direction == Direction.AXIAL)
-    one = replace(bare, solution=bare.solution.reevaluate(bare.model, axial))
+    one = bare.reevaluate(bare.model, axial)
     assert len(compound(one).columns) == len(columns) - 2
 
 

@@ -8,7 +8,7 @@ import pytest
 from scipy.special import logsumexp
 from scipy.stats import kstest, multivariate_normal, norm
 
-from bushfit.diagnosis.groups import Group
+from bushfit.diagnosis.explanations import Group
 from bushfit.diagnosis.linear_model import LinearModel
 from bushfit.diagnosis.priors import SIZES
 from bushfit.diagnosis.rig_errors import Block, NoiseCase, RigErrors

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from rigged import INERTIA, LEVELS, SHARED, SLIP, TWO, Effects
 
-from bushfit.diagnosis.evidence import fit
+from bushfit.diagnosis.fits import fit_model
 from bushfit.diagnosis.holdout import hold_out, hold_out_parts
 from bushfit.diagnosis.locate import find_regions
 from bushfit.diagnosis.record import MisfitRegion
@@ -92,7 +92,7 @@ def test_the_gap_is_that_of_a_refit(measured, fitted, hidden, effects, which):
     evidence = fitted(measured(hidden, SHARED), *effects)
     (found,) = [part for part in hold_out(evidence, evidence, {}).parts if part.part == which]
     (part,) = [part for part in hold_out_parts(evidence.data_sets) if part.name == which]
-    refitted = fit(evidence.model, part.rest(evidence.data_sets), (), {}).model
+    refitted = fit_model(evidence.model, part.rest(evidence.data_sets), (), {}).model
     expected = np.sqrt(np.mean(residual(refitted, evidence.data_sets)[part.rows(evidence.data_sets)] ** 2))
     as_fitted = np.sqrt(np.mean(evidence.residual[part.rows(evidence.data_sets)] ** 2))
     # the parts of a block that is cut in two share an error, which whitening then treats apart
@@ -105,7 +105,7 @@ def test_the_prediction_s_own_error_is_that_of_a_sandwich_of_runs_and_loops(meas
     evidence, which = fitted(measured(INERTIA, SHARED)), "amplitude level 3"
     (found,) = [part for part in hold_out(evidence, evidence, {}).parts if part.part == which]
     rows = next(part for part in hold_out_parts(evidence.data_sets) if part.name == which).rows(evidence.data_sets)
-    slopes, left = evidence.solution.jacobian, evidence.residual
+    slopes, left = evidence.jacobian, evidence.residual
     pairs = [
         (data, getattr(data, "held_value", np.zeros(data.size // data.residuals_per_point)))
         for data in evidence.data_sets

@@ -8,19 +8,19 @@ import pytest
 from rigged import LEVELS, SHARED, SMALLER
 
 from bushfit.campaign.schema import RigSettings
-from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.priors import WAVES
 from bushfit.diagnosis.rig_errors import error_blocks, in_scatter_units
 from bushfit.diagnosis.workflow import diagnose
 from bushfit.effects.contract import Array
 from bushfit.fitting.preparation import MeasuredSweep, split_by_kind
 from bushfit.fitting.prepared_campaign import PreparedCampaign
+from bushfit.fitting.problem import FitResult
 
 RIG = RigSettings(gain_error=4e-3, phase_error=3.5e-3)
 RUN, LEVEL, WAVE, LOOP = range(4)
 
 
-def off(evidence: Evidence, sweep: MeasuredSweep, change: Callable[[MeasuredSweep], Array]) -> Array:
+def off(evidence: FitResult, sweep: MeasuredSweep, change: Callable[[MeasuredSweep], Array]) -> Array:
     """What a small relative change of the measured stiffness does to the residuals, per unit of it."""
     step = 1e-6
     changed = replace(sweep, sweep=replace(sweep.sweep, stiffness=sweep.sweep.stiffness * (1.0 - step * change(sweep))))

@@ -9,8 +9,8 @@ import lmfit
 import numpy as np
 
 from bushfit.campaign.campaign import load_campaign
-from bushfit.diagnosis.evidence import Evidence, fit
-from bushfit.diagnosis.propose import missing_effects, sensitivity
+from bushfit.diagnosis.fits import fit_model
+from bushfit.diagnosis.propose import missing_effects, parameter_basis, sensitivity
 from bushfit.effects import BASE, Effect
 from bushfit.effects.contract import Array
 from bushfit.errors import BushfitError
@@ -18,6 +18,7 @@ from bushfit.fitting.coordinates import Coordinates, coordinate_bounds
 from bushfit.fitting.measured_sweep import MeasuredSweep
 from bushfit.fitting.preparation import with_gain_weighting
 from bushfit.fitting.prepared_campaign import PreparedCampaign
+from bushfit.fitting.problem import FitResult
 from bushfit.model.model import Model
 from tests.fits import residual
 
@@ -27,22 +28,22 @@ _MOST = 5
 _EVALUATIONS = 400
 
 
-def _plain_fit(folder: Path) -> tuple[Evidence, list[Effect]]:
+def _plain_fit(folder: Path) -> tuple[FitResult, list[Effect]]:
     """The paper's model fitted to all tests, and the effects that it lacks."""
     data = PreparedCampaign.from_campaign(load_campaign(folder / "bushing.toml"))
     data_sets = with_gain_weighting(data.data_sets, weigh=True)
-    evidence = fit(data.starting_model(BASE, data_sets, {}), data_sets, (), {})
+    evidence = fit_model(data.starting_model(BASE, data_sets, {}), data_sets, (), {})
     places = [str(test.direction) for test in evidence.data_sets]
     return evidence, [effect for effect in missing_effects(evidence.model, places) if effect.replaces is None]
 
 
-def _bic(evidence: Evidence, chi_square: float, parameters: int) -> float:
+def _bic(evidence: FitResult, chi_square: float, parameters: int) -> float:
     """BIC as lmfit has it, for noise of unknown size: n ln(chi-square/n) + k ln n, n independent points."""
     count = sum(test.independent_count for test in evidence.data_sets)
     return float(count * np.log(chi_square / count) + parameters * np.log(count))
 
 
-def _answer(evidence: Evidence, names: list[str], change: Array) -> dict[str, Any]:
+def _answer(evidence: FitResult, names: list[str], change: Array) -> dict[str, Any]:
     """The answer that names effects, whose change of the residuals, in units of noise, shows where."""
     where = []
     for test, rows in evidence.residual_rows.items():
@@ -71,8 +72,8 @@ def sparse(folder: Path) -> dict[str, Any]:
         shapes, found = sensitivity(evidence.model, evidence.data_sets, effect)
         names += [effect.name] * len(shapes)
         columns += list(found) if shapes else []
-    library, chosen, basis = np.array(columns), list[int](), evidence.span
-    left = evidence.residual
+    library, chosen, own = np.array(columns), list[int](), parameter_basis(evidence.jacobian)
+    basis, left = own, evidence.residual
     while len(chosen) < min(_MOST, len(library)):
         clear = library - (library @ basis) @ basis.T
         lengths = np.linalg.norm(clear, axis=1)
@@ -86,7 +87,7 @@ def sparse(folder: Path) -> dict[str, Any]:
         left = left - basis[:, -1] * (basis[:, -1] @ left)
     if not chosen:
         return _answer(evidence, [], left)
-    amounts = np.linalg.lstsq(np.vstack([evidence.span.T, library[chosen]]).T, -evidence.residual)[0]
+    amounts = np.linalg.lstsq(np.vstack([own.T, library[chosen]]).T, -evidence.residual)[0]
     change = amounts[-len(chosen) :] @ library[chosen]
     return _answer(evidence, list(dict.fromkeys(names[i] for i in chosen)), change)
 
@@ -114,7 +115,7 @@ def _started(model: Model, effect: Effect) -> Model:
     return model.with_values({name: effect.amount.value_at_share(0.1)})
 
 
-def _fitted_by_lmfit(evidence: Evidence, model: Model) -> tuple[Model, float]:
+def _fitted_by_lmfit(evidence: FitResult, model: Model) -> tuple[Model, float]:
     """The model after `lmfit.minimize` on the whitened residuals, and chi-square."""
     coordinates = Coordinates.of_parameters(model, tuple(model.values))
     low, high = coordinate_bounds(coordinates, {})

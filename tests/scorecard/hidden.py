@@ -14,7 +14,7 @@ from numpy.random import Generator
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.simulated import SimulatedLoop, SimulatedSweep, SimulateSettings
-from bushfit.diagnosis.evidence import fit
+from bushfit.diagnosis.fits import fit_model
 from bushfit.effects import BASE, LIBRARY, Effect, get_effect, qualified_name
 from bushfit.effects.contract import Array
 from bushfit.fitting.preparation import MeasuredTest
@@ -176,7 +176,7 @@ def _points(test: SimulatedSweep) -> tuple[Array, Array]:
 def _visible(plain: Model, model: Model, plan: SimulateSettings) -> float:
     """Largest misfit of a plain model fitted to what the model itself predicts, relative."""
     data_sets = _noise_free_data(model, plan)
-    fitted = fit(plain, data_sets, (), {}).model
+    fitted = fit_model(plain, data_sets, (), {}).model
     return max(data_set.change(fitted, model) for data_set in data_sets)
 
 

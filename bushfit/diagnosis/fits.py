@@ -1,0 +1,185 @@
+"""Fits of models to all tests of a campaign: one model, rival effects side by side, and the result for model.json."""
+
+from collections.abc import Collection, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import replace
+
+import numpy as np
+
+from bushfit.campaign.schema import UNSTATED, RigSettings
+from bushfit.effects import qualified_name
+from bushfit.effects.contract import Array
+from bushfit.errors import FitError, ModelError
+from bushfit.fitting.agreement import expected_errors
+from bushfit.fitting.assess import temperature_warning
+from bushfit.fitting.coordinates import Bounds
+from bushfit.fitting.descent import Descent
+from bushfit.fitting.design import shape_start_values
+from bushfit.fitting.levels import LevelErrors
+from bushfit.fitting.model_error import with_excess_errors
+from bushfit.fitting.preparation import MeasuredTest, with_level_errors
+from bushfit.fitting.problem import FitProblem, FitResult
+from bushfit.fitting.procedures import build_result
+from bushfit.fitting.shared_errors import SharedErrors
+from bushfit.model.covariance import Covariance
+from bushfit.model.model import Model
+from bushfit.model.result import Result
+from bushfit.progress import track
+
+#: Maximum number of model evaluations in one fit; a model that fits badly is used unconverged.
+EVALUATIONS = 40
+#: Chi-square above that of the best refit at which a refit is abandoned before it has converged.
+_FAR = 60.0
+#: Further decrease of chi-square that a fit may make, relative to the decrease that a linear model expects.
+_MOST_FALL = 4.0
+#: Number of model evaluations before which no refit is abandoned: parameters that the gap has distorted recover slowly.
+_FIRST = 16
+#: Warning for a model with a smooth correction.
+_CORRECTED = (
+    "a smooth correction closes a gap that no effect explains: "
+    "the parameters and their intervals contain a part of this gap"
+)
+
+
+def fit_model(model: Model, data_sets: Sequence[MeasuredTest], fixed: Sequence[str], bounds: Bounds) -> FitResult:
+    """Fit the parameters of a model to tests, starting from the model's values.
+
+    Args:
+        model: the model at its starting values.
+        data_sets: the tests.
+        fixed: names of parameters that are not fitted.
+        bounds: limits of parameters inside their general limits.
+
+    Returns:
+        The fitted model with its tests.
+
+    Raises:
+        FitError: fewer data than parameters, or no finite response.
+        ModelError: no response.
+    """
+    return Descent.start(FitProblem.with_fixed(model, data_sets, fixed, bounds)).run(EVALUATIONS).solution
+
+
+def fit_rivals(
+    models: Mapping[str, Model],
+    data_sets: Sequence[MeasuredTest],
+    start: Mapping[str, float],
+    fixed: Sequence[str],
+    bounds: Bounds,
+    columns: Array | None = None,
+) -> dict[str, FitResult]:
+    """Fit several models with proposed effects side by side, and abandon those that fall far behind the best.
+
+    Args:
+        models: models at their starting values, by the name of the effect.
+        data_sets: the tests.
+        start: further starting values, by parameter.
+        fixed: names of parameters that are not fitted.
+        bounds: limits of parameters inside their general limits.
+        columns: common errors of all tests, as residuals per standard deviation, (c, n); None without such errors.
+
+    Returns:
+        Fits by the name of the effect; fits far behind the best, and effects without a response, are left out.
+    """
+    fits = dict[str, Descent]()
+    shared_error = None if columns is None else SharedErrors.from_columns(columns)
+    for name, model in models.items():
+        model = model.with_values({key: value for key, value in start.items() if key in model.values})
+        limits = {**within_reach(model, data_sets), **bounds}  # at the start: the gap has distorted the fit before
+        with suppress(FitError, ModelError):  # no response with this effect: no candidate
+            problem = FitProblem.with_fixed(model, data_sets, fixed, limits)
+            fits[name] = Descent.start(replace(problem, shared_error=shared_error))
+    running, best = list(fits), 0.0
+    for _ in track("evaluations of effects", range(1, EVALUATIONS)):
+        for name in running:
+            fits[name] = fits[name].run(fits[name].evaluations + 1)
+        best = min((fit.chi_square for fit in fits.values()), default=0.0)
+        for name in list(running):
+            fit = fits[name]
+            behind = fit.evaluations >= _FIRST and fit.chi_square - _MOST_FALL * fit.expected_fall >= best + _FAR
+            if fit.converged or behind:
+                running.remove(name)
+        if not running:
+            break
+    return {
+        name: fit.solution
+        for name, fit in fits.items()
+        if fit.converged or fit.evaluations >= EVALUATIONS or fit.chi_square <= best + _FAR
+    }
+
+
+def within_reach(model: Model, data_sets: Sequence[MeasuredTest]) -> Bounds:
+    """Limits of the shape parameters of effects to the range that the tests can show.
+
+    For example, a stop that is always in contact is a spring, and a resonance far above all frequencies is a mass.
+
+    Args:
+        model: model with the effects.
+        data_sets: the tests.
+
+    Returns:
+        Lower and upper limit by parameter name.
+    """
+    tried = {
+        qualified_name(effect, parameter): shape_start_values(data_sets, model, parameter)
+        for effect in model.records
+        for parameter in effect.parameters
+        if parameter.scale
+    }
+    return {name: (float(values.min()), float(values.max())) for name, values in tried.items() if np.ptp(values) > 0.0}
+
+
+def result_of(
+    fit: FitResult,
+    bounds: Bounds,
+    resolved: Collection[str],
+    *,
+    lacking: bool = True,
+    corrected: FitResult | None = None,
+    rig: RigSettings = UNSTATED,
+    fixed: Covariance | None = None,
+) -> Result:
+    """Build the result of a fit, with its uncertainty; a parameter at a bound is treated as fixed.
+
+    Args:
+        fit: the fitted model and the tests.
+        bounds: limits of parameters inside their general limits.
+        resolved: names of effects known to belong to the bushing and not to the rig; the model's other effects with a
+            twin in the rig are reported as unresolved.
+        lacking: False if the record of the tests has a mistake, so that no error of the model is estimated.
+        corrected: fit together with a smooth correction of the model; None if the model has no correction.
+        rig: stated accuracy class of the rig (gain and phase errors).
+        fixed: covariance of parameters that the fit kept fixed; None if these are exact.
+
+    Returns:
+        The model with covariance, quality, range, warnings and expected error.
+    """
+
+    def with_levels(errors: LevelErrors) -> FitResult:
+        """Repeat the fit with noise that contains errors shared by all runs of a level."""
+        tests = with_level_errors(fit.problem.tests, errors.error, errors.freedom)
+        return Descent.start(replace(fit.problem, model=fit.model, tests=tests)).run(EVALUATIONS).solution
+
+    closest, error, misses = fit, None, list[str]()
+    if corrected:
+        closest, misses = replace(corrected, noise_weighted=fit.data_sets), [_CORRECTED]
+    elif lacking:
+        closest, error, misses = with_excess_errors(fit, bounds, rig, with_levels)
+    model = fit.model if corrected else closest.model
+    notes = (*misses, *temperature_warning(model, fit.data_sets))
+    return replace(
+        build_result([closest], bounds, model=model, fixed=fixed, notes=notes, bounded_is_fixed=True),
+        # a correction has seen every run
+        usable=expected_errors(model, fit.data_sets, fit=None if corrected else closest),
+        model_error=error,
+        unresolved=tuple(effect.name for effect in model.records if effect.twins and effect.name not in resolved),
+    )
+
+
+def misfit_covariance(fit: FitResult) -> Covariance:
+    """Covariance of the parameters that are not at a bound, larger by the reduced chi-square of a fit with a misfit."""
+    matrix = np.linalg.pinv(fit.jacobian @ fit.jacobian.T, rcond=1e-12, hermitian=True)
+    matrix *= max(fit.chi_square / max(fit.residual.size - len(matrix), 1), 1.0)  # what the fit misses
+    slopes = fit.coordinates.slopes(fit.model.values)
+    covariance = Covariance(tuple(fit.names), matrix * np.outer(slopes, slopes))
+    return covariance.restricted([name for name in fit.model.values if name not in fit.at_bound])
