@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bushfit.effects.contract import Array
-from bushfit.fitting.outliers import are_outliers, are_stuck, outlier_limit
+from bushfit.fitting.outliers import NEIGHBOURS, are_outliers, are_stuck, outlier_limit
 from bushfit.fitting.repeats import FLOOR
 from bushfit.reading.measurement import Loop
 from bushfit.reduction.arrays import CHUNK, MEDIAN_TO_SIGMA, by_chunks
@@ -61,7 +61,7 @@ class LoopHarmonics(NamedTuple):
     outliers: Mapping[str, OutlierRows]
 
 
-def loop_harmonics(loop: Loop, frequency: float, cycles: float) -> LoopHarmonics:
+def loop_harmonics(loop: Loop, frequency: float, cycles: float, *, from_rest: bool = False) -> LoopHarmonics:
     """Determine harmonics of displacement and force, the noise of the force, and outliers of both.
 
     Noise is the part of the force that does not repeat from cycle to cycle, or is too fast for rubber. Slow changes
@@ -71,10 +71,15 @@ def loop_harmonics(loop: Loop, frequency: float, cycles: float) -> LoopHarmonics
         loop: steady cycles of a loop.
         frequency: frequency of the motion [Hz].
         cycles: number of cycles, including fractions.
+        from_rest: True if the record begins at rest. The force of its first cycle is not that of the later ones; it
+            then counts towards harmonics and noise only if no whole cycle follows, and is compared with its neighbours
+            to find outliers.
 
     Returns:
         Harmonics, noise and outliers.
     """
+    from scipy.ndimage import median_filter
+
     chosen = spread_rows(loop.time.size, MOST_ROWS)
     phase = (loop.time[chosen] - loop.time[0]) * frequency
     order = resolved_order(loop.time.size / max(cycles, 1.0), _MOST_HARMONICS)
@@ -82,23 +87,30 @@ def loop_harmonics(loop: Loop, frequency: float, cycles: float) -> LoopHarmonics
     grid = np.arange(GRID + 1) / GRID
     recorded = {"displacement": loop.displacement, "force": loop.force}
     values = np.column_stack([column[chosen] for column in recorded.values()])
-    solution, inliers, outliers = least_squares(columns, values), np.empty(values.shape, dtype=bool), {}
+    transient = (1.0 if cycles >= 2.0 else np.inf) if from_rest else 0.0
+    settled = phase >= transient
+    solution, inliers, outliers = np.empty((columns.shape[1], 2)), np.zeros(values.shape, dtype=bool), {}
     for i, (name, column) in enumerate(recorded.items()):
-        solution[:, i], inliers[:, i] = _fit_without_outliers(columns, values[:, i], solution[:, i])
+        used = settled if name == "force" and settled.any() else np.full(phase.size, True)
+        solution[:, i], inliers[used, i] = _fit_without_outliers(columns[used], values[used, i])
         outliers[name] = _NO_OUTLIERS
-        if column.size <= _MOST_ROWS_CHECKED or not inliers[:, i].all():
-            residual = values[:, i] - columns @ solution[:, i]
-            cycle = np.interp((loop.time - loop.time[0]) * frequency % 1.0, grid, basis(grid, order) @ solution[:, i])
+        if column.size <= _MOST_ROWS_CHECKED or not inliers[used, i].all():
+            residual = (values[:, i] - columns @ solution[:, i])[used]
+            turn = (loop.time - loop.time[0]) * frequency
+            distance = column - np.interp(turn % 1.0, grid, basis(grid, order) @ solution[:, i])
+            if from_rest and name == "force":
+                first = turn < transient
+                distance[first] -= median_filter(distance[first], NEIGHBOURS, mode="nearest")
             limit = outlier_distance(solution[:, i], residual, column.size)
-            rows = np.flatnonzero(are_outliers(column - cycle, column, limit) | are_stuck(column))
-            outliers[name] = OutlierRows(rows, np.abs((column - cycle)[rows]) / _noise(solution[:, i], residual))
+            rows = np.flatnonzero(are_outliers(distance, column, limit) | are_stuck(column))
+            outliers[name] = OutlierRows(rows, np.abs(distance[rows]) / _noise(solution[:, i], residual))
     remainder = values - columns @ solution
     of_motion, of_force = inliers.T
     freedom = np.maximum(np.count_nonzero(inliers, axis=0) - 2 * order - 1, 1)
     motion_noise = float(np.sqrt(np.sum(np.square(remainder[of_motion, 0])) / freedom[0]))
     motion = _cleared(as_complex(solution[:, 0]), motion_noise, phase, values[:, 0], of_motion)
-    settled, unknowns = remove_slow_changes(phase[of_force], remainder[of_force, 1])
-    force_noise = float(np.sqrt(np.sum(np.square(settled)) / max(freedom[1] - unknowns, 1)))
+    scatter, unknowns = remove_slow_changes(phase[of_force], remainder[of_force, 1])
+    force_noise = float(np.sqrt(np.sum(np.square(scatter)) / max(freedom[1] - unknowns, 1)))
     return LoopHarmonics(motion, as_complex(solution[:, 1]), force_noise, outliers)
 
 
@@ -163,21 +175,20 @@ def outlier_distance(solution: Array, residual: Array, rows: int) -> float:
     return outlier_limit(rows, 1, np.inf) * (MEDIAN_TO_SIGMA * float(np.median(np.abs(residual)))) + corner
 
 
-def _fit_without_outliers(columns: Array, values: Array, solution: Array) -> tuple[Array, Array]:
+def _fit_without_outliers(columns: Array, values: Array) -> tuple[Array, Array]:
     """Fit harmonics to a displacement or force without its outliers.
 
-    Least squares, as in `solution`, may follow a cluster of outliers. Rows are therefore first weighted down by their
-    distance; then outliers are found and left out repeatedly until the set of outliers no longer changes.
+    Least squares may follow a cluster of outliers. Rows are therefore first weighted down by their distance; then
+    outliers are found and left out repeatedly until the set of outliers no longer changes.
 
     Args:
         columns: basis of mean, cosines and sines at the rows, (n, 2 order + 1).
         values: displacement or force of the rows, (n,).
-        solution: harmonics by least squares, (2 order + 1,).
 
     Returns:
         Harmonics, (2 order + 1,), and the mask of the rows that are no outliers, (n,).
     """
-    inliers, stuck = np.ones(values.size, dtype=bool), are_stuck(values)
+    solution, inliers, stuck = least_squares(columns, values), np.ones(values.size, dtype=bool), are_stuck(values)
     if _inliers(columns, values, solution, stuck).all():
         return solution, inliers
     for _ in range(10):  # of weighting down; chosen

@@ -186,12 +186,12 @@ def prepare_loop(loop: Loop, *, without_outliers: bool = False) -> PreparedLoop:
     loop, frequency, cycles, left_out = steady_cycles(whole)
     first_row = int(np.searchsorted(whole.time, loop.time[0]))
     found = loop_harmonics(loop, frequency, cycles)
+    rests = (False, False) if first_row else _starts_at_rest(loop, found, frequency)
+    if from_rest := any(rests):
+        found = loop_harmonics(loop, frequency, cycles, from_rest=True)
     outliers = found.outliers["force"].rows
-    half_motion = float(np.ptp(series(found.motion, np.arange(GRID) / GRID))) / 2.0
     half_force = float(np.ptp(np.delete(loop.force, outliers))) / 2.0
     noise = loop.noise * half_force if loop.noise is not None else found.force_noise
-    rests = _starts_at_rest(loop, found, frequency, half_motion, half_force, noise)
-    from_rest = first_row == 0 and any(rests)
     unweighted = outliers if without_outliers else outliers[:0]
     clock = loop.time - loop.time[0] if loop.time[0] else loop.time
     points = clock * frequency, loop.force, 1.0 - np.isin(np.arange(loop.force.size), unweighted)
@@ -225,7 +225,7 @@ def prepare_loop(loop: Loop, *, without_outliers: bool = False) -> PreparedLoop:
         # a stiffness that is not the same to either side makes a mean force too, and a second harmonic of its size
         mean, _, cosine, _, sine = least_squares(basis(prepared.phase, 2), prepared.force, prepared.weight)
         preload = float(mean) if abs(mean) - np.hypot(cosine, sine) > _PRELOADED * half_force else None
-        unknown = prepared.has_predecessor or abs(found.motion[0]) > 0.01 * half_motion
+        unknown = prepared.has_predecessor or abs(found.motion[0]) > 0.01 * prepared.amplitude
         prepared = replace(prepared, datum=float(found.force[0].real) if unknown else preload)
     return replace(prepared, notes=(*prepared.notes, *_preload_notes(prepared)))
 
@@ -307,9 +307,7 @@ def _at_reversal(prepared: PreparedLoop) -> Array:
     return np.minimum(position - turns[after - 1], turns[after] - position) < 1.5
 
 
-def _starts_at_rest(
-    loop: Loop, harmonics: LoopHarmonics, frequency: float, half_motion: float, half_force: float, noise: float
-) -> tuple[bool, bool]:
+def _starts_at_rest(loop: Loop, harmonics: LoopHarmonics, frequency: float) -> tuple[bool, bool]:
     """Test whether a record begins at rest at zero, or at rest about a preload.
 
     If a record begins at rest, the force at its start differs from the force one cycle later by more than noise
@@ -320,13 +318,13 @@ def _starts_at_rest(
         loop: steady cycles of the record.
         harmonics: harmonics of the loop.
         frequency: frequency of the motion [Hz].
-        half_motion: half of the range of the displacement [m or rad].
-        half_force: half of the range of the force [N or N m].
-        noise: standard deviation of one row's force [N or N m].
 
     Returns:
         Two flags: True if it begins at rest at zero, and True if it begins at rest about a preload.
     """
+    half_motion = float(np.ptp(series(harmonics.motion, np.arange(GRID) / GRID))) / 2.0
+    half_force = float(np.ptp(np.delete(loop.force, harmonics.outliers["force"].rows))) / 2.0
+    noise = loop.noise * half_force if loop.noise is not None else harmonics.force_noise
     end = np.searchsorted(loop.time, loop.time[0] + 2.0 / frequency)
     clock, force = loop.time[:end] - loop.time[0], loop.force[:end]
     comparable = np.searchsorted(clock, clock[-1] - 1.0 / frequency, side="right")  # a cycle later

@@ -157,7 +157,8 @@ def _force(result: Result, model: Model, place: Place, history: History, conditi
 
         measured_in_sines = model.unnamed or result.model_error
         far = measured_in_sines.far_deviation if measured_in_sines else 0.0
-        real, imaginary = np.maximum(np.abs(errors.relative).max(axis=-1), far)
+        relative = np.linalg.norm([errors.relative.real, errors.relative.imag], axis=1)
+        real, imaginary = np.maximum(relative.max(axis=-1), far)
         quadrature = hilbert(force, next_fast_len(force.size)).imag[: force.size]
         half = np.sqrt(half**2 + Z95**2 * ((real * force) ** 2 + (imaginary * quadrature) ** 2))
     return Band(force, force - half, force + half)

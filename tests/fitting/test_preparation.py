@@ -236,15 +236,21 @@ def test_the_motion_is_cleared_and_the_true_model_leaves_only_noise(paper_model,
 def test_from_rest_which_may_be_a_preload_the_virgin_curve_is_followed(paper_model, cycles, amplitude, preload):
     whole = rig.simulate_cycles(paper_model, Direction.AXIAL, FREQUENCY, amplitude, cycles=4, steps_per_cycle=1000)
     rows = slice(round(1000 * cycles) + 1)
-    noise = 3e-3 * np.ptp(whole.force) * np.random.default_rng(0).standard_normal(whole.force.size)
+    noise = 3e-3 * np.ptp(whole.force) / 2.0 * np.random.default_rng(0).standard_normal(whole.force.size)
     force, settled = whole.force + preload + noise, slice(2000, None)
+    force[400] += 0.2 * np.ptp(whole.force)
     motion = whole.displacement + 1.2e-3 * (preload > 0.0)
     loop = Loop("loop", Direction.AXIAL, whole.time[rows], motion[rows], force[rows])
     data_set = MeasuredLoop(prepare_loop(loop))
-    residual = data_set.residual(paper_model)
+    residual = MeasuredLoop(prepare_loop(loop, without_outliers=True)).residual(paper_model)
     reduced = float(residual @ residual) / data_set.residual_count
     assert data_set.prepared.from_rest
-    assert reduced < 1.2
+    assert data_set.outlier_indices(paper_model).tolist() == [400]
+    if cycles >= 2:
+        assert data_set.relative_noise == pytest.approx(3e-3, rel=0.1)
+        assert 0.8 < reduced < 1.2
+    else:  # the noise of a single cycle from rest cannot be separated from its start
+        assert reduced < 1.2
     assert not data_set.prepared.history(is_transient=False).periodic
     assert ("recorded about a mean displacement of 1.2 mm" in " ".join(data_set.notes)) == (preload > 0.0)
     later = Loop("loop", Direction.AXIAL, whole.time[settled], motion[settled], force[settled])

@@ -105,7 +105,9 @@ def test_a_steady_state_is_that_of_the_closed_form(paper_model, corrected):
         unnamed = Unnamed(0.05, (1.0, 1.0), (patch,))
         paper_model = paper_model.with_defaults(paper_model.bushing, effects, paper_model.values, unnamed)
     motion = amplitude * np.sin(2.0 * np.pi * 10.0 * np.arange(400 * cycles) / 4000.0)
-    response = time_response(Result(paper_model), Direction.RADIAL, History.sampled(motion, 1 / 4000, periodic=True))
+    late = paper_model.with_effect("delay", {"delay.tau": 1e-4})
+    result = Result(late, ("delay.tau",), Covariance(("delay.tau",), np.array([[1e-10]])))
+    response = time_response(result, Direction.RADIAL, History.sampled(motion, 1 / 4000, periodic=True))
     ratio = np.fft.rfft(response.force.value)[cycles] / np.fft.rfft(motion)[cycles]
     stiffness = paper_model.stiffness("radial", 10.0, amplitude)
     assert ratio == pytest.approx(stiffness, rel=1e-3)
