@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import Any, get_args, get_type_hints
 
 import click
-import numpy as np
 import pytest
 import yaml
 from effect_tables import PAGE, renewed
@@ -27,10 +26,7 @@ from bushfit.batch.limits import Limits
 from bushfit.batch.manifest import ManifestFile
 from bushfit.campaign.schema import CampaignFile
 from bushfit.cli import cli
-from bushfit.geometry import Direction, Specimen
-from bushfit.reading.loops import read_loop
-from bushfit.reading.stated import LoopFile, SweepFile
-from bushfit.reading.sweeps import read_sweep
+from bushfit.geometry import Specimen
 
 
 def blocks(page: Path, language: str) -> list[str]:
@@ -182,36 +178,6 @@ def test_the_steps_before_a_merge_are_the_same_wherever_they_stand(root):
     assert blocks(root / "README.md", "sh")[1].rstrip().endswith(f"--editable . --group dev && {merged[4]}")
     assert entries == [step for step in merged if not step.startswith("pytest")]
     assert all(repository["repo"] == "local" for repository in hooks)
-
-
-#: Copies of the paper's tests in other formats, with what they do not tell of themselves.
-COPIES: dict[str, dict[str, Any]] = {
-    **{f"cmp_15961_workbook/{name}.xlsx": {} for name in ("loop_axial", "sweep_axial", "sweep_radial")},
-    "cmp_15961_recordings/loop_axial.tdms": {},
-    "cmp_15961_recordings/loop_axial.mat": {
-        "columns": {"displacement": "x"},
-        "units": {"time": "s", "displacement": "mm", "force": "N"},
-    },
-    "cmp_15961_recordings/loop_axial.mf4": {},
-    "cmp_15961_recordings/sweep_radial.parquet": {},
-    "cmp_15961_recordings/sweep_axial.uff": {"sheet": "0.1 mm"},
-}
-
-
-@pytest.mark.parametrize("copy", COPIES)
-def test_files_of_other_formats_hold_their_csv(root, copy):
-    """Of a loop every fifth row; of a UFF file the first rows, which are those of an amplitude."""
-    kind, direction = Path(copy).stem.split("_")
-    read: Any = read_loop if kind == "loop" else read_sweep
-    stated = LoopFile if kind == "loop" else SweepFile
-    csv_file = root / f"data/cmp_15961/{kind}_{direction}{'_1' * (kind == 'loop')}.csv"
-    kept = read(csv_file, Direction(direction), stated(file=""))
-    held = {"at_amplitude": 1e-4} if copy.endswith("uff") else {}
-    own = read(root / "data" / copy, Direction(direction), stated(file="", **COPIES[copy]), **held)
-    columns = ("time", "displacement", "force") if kind == "loop" else ("frequency", "amplitude", "stiffness", "repeat")
-    for column in columns:
-        csv = getattr(kept, column)[:: 5 if kind == "loop" else 1][: getattr(own, column).size]
-        np.testing.assert_allclose(getattr(own, column), csv, rtol=1e-9 if kind == "loop" else 1e-5, atol=1e-12)
 
 
 @pytest.fixture(scope="module")

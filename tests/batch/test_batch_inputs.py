@@ -12,10 +12,7 @@ from bushfit.batch.document import Estimate, RowFile
 from bushfit.batch.limits import RESULTS, Limits, judge_part, judge_value, read_limits, resolve_limits
 from bushfit.batch.manifest import Manifest, RowSettings, read_manifest
 from bushfit.batch.quantities import list_quantities, measured_at, parse_point
-from bushfit.batch.row import estimate_quantities
-from bushfit.errors import BatchError, ModelError
-from bushfit.geometry import Direction, Specimen
-from bushfit.model.result import Result
+from bushfit.geometry import Direction
 from bushfit.reading.measurement import Sweep
 from bushfit.reduction.arrays import median_and_scatter
 
@@ -187,16 +184,3 @@ def test_the_measured_point_is_the_mean_of_its_repeats_with_the_noise_of_one():
     assert (loss.value, loss.stderr) == pytest.approx((0.1, 1.01 * 0.01 / math.sqrt(2)))
     assert measured_at([sweep], parse_point("axial 30 Hz 0.1 mm"), 0.01) == {}
     assert measured_at([sweep], parse_point("radial 25 Hz 0.1 mm"), 0.01) == {}
-
-
-def test_a_point_at_a_specimen_is_that_of_the_model(paper_model):
-    result = Result(paper_model, specimens=(coupon := Specimen("DMA", "modulus"),))
-    estimates, _ = estimate_quantities(result, [parse_point("DMA 10 Hz 1 %")])
-    modulus = abs(paper_model.stiffness(coupon, 10.0, 0.01))
-    assert estimates["stiffness DMA 10 Hz 1 %"].value == pytest.approx(modulus)
-    with pytest.raises(
-        BatchError, match=r"the unit of this amplitude does not suit this direction or specimen[\s\S]*an amplitude in %"
-    ):
-        estimate_quantities(result, [parse_point("DMA 10 Hz 1 mm")])
-    with pytest.raises(ModelError, match="no such direction or specimen"):
-        estimate_quantities(result, [parse_point("coupon 10 Hz 1 %")])

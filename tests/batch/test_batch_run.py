@@ -4,10 +4,7 @@ import json
 import math
 import os
 import signal
-import subprocess
-import sys
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -42,32 +39,6 @@ def test_a_row_is_the_single_command_to_the_last_digit(typed, shop):
     single, joint = tree(shop / "one/2"), tree(shop / "one/joint")
     single["joint.json"] = joint.pop("model.json")
     assert tree(shop / "all/bushings/c") == single | joint
-
-
-@pytest.mark.slow
-def test_a_row_may_be_the_whole_chain(typed, shop):
-    """Of a campaign that hides an inertia; what its limits do not allow is a status of 1."""
-    (shop / "limits.toml").write_text('verdicts = ["consistent"]\n')
-    asked = ("--command", "run", "--tables", "-o", "all", "-q", "--limits", "limits.toml")
-    typed("batch", "bushings/b[1]/bushing.toml", *asked, status=1)
-    typed("run", "bushings/b1/bushing.toml", "-o", "one", "--no-plots", "--no-report")
-    (heavy,) = rows(shop / "all")
-    found = tree(shop / "all" / heavy["folder"])
-    assert found == tree(shop / "one")
-    assert {"static.json", "dynamic.json", "joint.json", "diagnosis.json", "axial.csv"} <= found.keys()
-    assert (heavy["verdict"], heavy["named effects"]) == ("named", "inertia")
-    assert float(heavy["inertia.mass [kg]"]) > 0
-
-
-@pytest.mark.slow
-def test_a_row_is_the_single_command_in_whatever_surroundings(typed, root, tmp_path):
-    """A user's terminal gives the linear algebra every core, and a sum split over threads ends in other digits."""
-    campaign, program = root / "configs/cmp_15961.toml", str(Path(sys.executable).with_name("bushfit"))
-    single = [program, "fit", str(campaign), "-o", str(tmp_path / "one"), "--no-plots", "-q"]
-    crowded = {**os.environ, "OPENBLAS_NUM_THREADS": "4", "OMP_NUM_THREADS": "4", "MKL_NUM_THREADS": "4"}
-    subprocess.run(single, check=True, env=crowded)
-    typed("batch", str(campaign.with_name("cmp_*.toml")), "-o", "all", "-q", "--no-plots")
-    assert tree(tmp_path / "all/bushings/cmp_15961").items() <= tree(tmp_path / "one").items()
 
 
 def test_the_table_is_in_order_with_units_and_the_numbers_of_the_models(typed, shop):

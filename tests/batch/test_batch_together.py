@@ -87,12 +87,6 @@ def test_a_soft_part_of_ten_is_named():
     assert not find_outliers({"0": (values[0], np.where(np.arange(10) == 6, 9.0, 0.1))})[1]["0"].any(), "a large error"
 
 
-def test_two_soft_parts_of_eight_do_not_hide_each_other():
-    values = 100.0 * (1.0 + 0.012 * np.random.default_rng(1).normal(size=8))
-    values[[3, 5]] = 87.7, 90.7
-    assert np.flatnonzero(find_outliers({"mu": (values, np.full(8, np.nan))})[1]["mu"]).tolist() == [3, 5]
-
-
 @pytest.mark.parametrize("count", [5, 8, 30])
 @pytest.mark.parametrize("error", [0.0, 3.0])
 def test_a_part_is_named_by_chance_in_one_batch_of_twenty_at_most(count, error):

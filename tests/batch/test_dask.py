@@ -83,20 +83,6 @@ def test_a_scheduler_that_is_lost_is_one_error_and_the_work_is_kept(shop, cluste
     assert kept(shop / "cluster") >= 5
 
 
-def test_the_last_worker_lost_is_a_warning_and_then_an_error(shop, cluster):
-    address, (_, victim, other) = cluster
-    list_many(shop, 20)
-    code = "from bushfit.batch import executor; from bushfit.cli import main; executor.NO_WORKER_SECONDS = 3.0; main()"
-    arguments = ["batch", "many.csv", "-o", "cluster", "--no-plots", "--scheduler", address]
-    running = subprocess.Popen([sys.executable, "-c", code, *arguments], cwd=shop, stderr=subprocess.PIPE)
-    wait_for(running, shop / "cluster", 3)
-    victim.kill()
-    other.kill()
-    _, err = running.communicate(timeout=30)
-    assert (running.returncode, b"Traceback" in err) == (2, False), err.decode()
-    assert err.index(b"waiting 3 s for one") < err.index(b"no Dask worker is left")
-
-
 def test_no_scheduler_at_the_address(typed, shop):
     """Nobody, a service that says nothing, an unknown scheme, and no address."""
     with socket.create_server(("127.0.0.1", 0)) as silent:

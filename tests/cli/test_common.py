@@ -167,13 +167,6 @@ def test_the_installed_command_answers_a_shell():
     assert subprocess.run([program], env=env, capture_output=True, check=True).stdout == b"plain,simulate\n"
 
 
-@pytest.mark.parametrize("shell", ["bash", "zsh", "fish", "powershell"])
-def test_the_line_on_the_page_is_what_each_shell_takes(root, shell):
-    assert f"{shell}_source" in (root / "configs/README.md").read_text(encoding="utf-8")
-    done = CliRunner().invoke(cli, prog_name="bushfit", env={"_BUSHFIT_COMPLETE": f"{shell}_source"})
-    assert f"{shell}_complete" in done.stdout
-
-
 @pytest.fixture
 def folder(tmp_path, monkeypatch) -> Path:
     monkeypatch.chdir(tmp_path)

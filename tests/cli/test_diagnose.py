@@ -120,12 +120,6 @@ def test_options_reach_the_workflow(bushfit, tmp_path):
     assert document(tmp_path / "x" / "model.json")["effects"] == [*BASE, "inertia"]
 
 
-@pytest.mark.slow
-def test_an_effect_that_is_left_out_is_not_named(bushfit, tmp_path):
-    done = bushfit("diagnose", CAMPAIGN, "--without", "inertia", "-o", tmp_path / "x", "--json", "--no-plots")
-    assert all(effect["name"] != "inertia" for effect in json.loads(done.stdout)["effects"])
-
-
 def test_a_clean_campaign(bushfit, tmp_path):
     run = bushfit("diagnose", CLEAN, "-o", tmp_path / "x", "--no-plots")
     assert run.stdout == ""
@@ -188,16 +182,3 @@ def test_a_line_in_the_campaign_or_adopted_aloud_puts_it_right(bushfit, work):
     bushfit("diagnose", "doubled/mended.toml", "--no-plots", "-o", "mended")
     for folder in ("adopted", "mended"):
         assert document(work / folder / "diagnosis.json")["verdict"] == "consistent"
-
-
-def test_run_uses_the_tests_as_they_are_and_warns(bushfit, work):
-    done = bushfit("run", DOUBLED, "-o", "ran", "--no-plots")
-    said = " ".join(done.stderr.split())
-    assert "sweep_axial.csv are peak-to-peak" in said
-    assert f"(or bushfit diagnose CAMPAIGN --adopt {LABEL})" in said, "run takes no --adopt"
-    action = done.stderr.splitlines()[1]
-    assert action.startswith("  use ")
-    assert action.endswith("fit to the uncorrected tests: correct the record first, then run again")
-    model = document(work / "ran/model.json")
-    assert model["effects"] == ["elastic", "springpot", "friction"]
-    assert any("fitted to the tests as they are" in warning for warning in model["warnings"])

@@ -11,11 +11,7 @@ from commandline import Done, Run, typing
 from shell import CAMPAIGN, document, names, values
 from virtual_rig import LOOP, MOUNT, SWEEPS, rig
 
-from bushfit.cli.run import two_step_line
-from bushfit.fitting.procedures import TwoStep
-from bushfit.model.covariance import Covariance
 from bushfit.model.file import load_result
-from bushfit.model.result import Result
 
 FILES = {
     "fit-static": {"static.json", "loops.csv", "loops.png"},
@@ -265,23 +261,3 @@ def test_what_gives_way_in_one_direction_or_in_all_is_a_set_where_it_is_equal(
     assert ("sleeve_compliance" in added) == (found["verdict"] == "named")
     if leader["alternatives"]:
         assert re.search(rf"bushfit plan tests/campaign.toml --rivals {','.join(named)} ", found["next_test"])
-
-
-@pytest.mark.parametrize(
-    ("error", "off", "bound", "said"),
-    [
-        (0.3, 0.0, {}, "1 pass, agrees with the joint fit within 1 standard error ("),
-        (0.3, 0.5, {}, "1 pass, agrees with the joint fit within 2 standard errors ("),
-        (0.01, 0.98, {}, "does not agree with the joint fit; largest difference: mu ("),
-        (1e8, 0.5, {"mu": "min"}, "1 pass, ended at a bound: mu ("),
-    ],
-)
-def test_the_line_on_two_steps_counts_no_meaningless_errors(paper_model, error, off, bound, said):
-    mu = 1e6
-
-    def fitted(share: float, value: float, **more: object) -> Result:
-        covariance = Covariance(("mu",), np.array([[(share * mu) ** 2]]))
-        return Result(paper_model.with_values({"mu": value}), ("mu",), covariance, **more)  # type: ignore[arg-type]
-
-    two_step = TwoStep(({},), fitted(error, (1.0 + off) * mu, at_bound=bound))
-    assert said in two_step_line(two_step, fitted(0.01, mu))

@@ -44,15 +44,6 @@ def test_the_campaign_loads_and_fits_and_its_geometry_is_echoed(typed, tests, tm
     assert fitted == pytest.approx(table_1, rel=0.02)
 
 
-def test_a_locked_folder_is_left_out(typed, tests, monkeypatch):
-    (tests[0].parent / "locked").mkdir()
-    monkeypatch.setattr("os.access", lambda path, _: Path(path).name != "locked")  # rights do not bind root
-    done = typed("init", tests[0].parent, *GEOMETRY, "-o", "lab/campaign")
-    assert "left out: lab/my tests/locked: no permission to read this folder" in done.stderr.replace(
-        str(tests[0].parents[2]) + "/", ""
-    )
-
-
 def test_where_it_is_written_and_that_the_next_line_can_be_pasted(typed, tests, tmp_path):
     done = typed("init", *tests, *GEOMETRY, "-o", "lab/my.toml", "--json")
     text = (tmp_path / "lab/my.toml").read_text(encoding="utf-8")
@@ -212,20 +203,6 @@ def test_at_a_terminal_what_lacks_is_asked_for(typed, silent, tmp_path, monkeypa
     assert campaign.path.read_text(encoding="utf-8").count('preload = "500 N axial"') == 2, "asked for once"
     assert campaign.sweeps[0].amplitude.max() == pytest.approx(0.25e-3)
     assert campaign.loops[0].time[-1] == pytest.approx(30.0, rel=0.01)
-
-
-@pytest.mark.parametrize("count", [0, 3, 8, len(ANSWERS) - 1])
-def test_who_leaves_a_question_open_has_nothing_written(typed, silent, tmp_path, monkeypatch, count):
-    answering(monkeypatch, *ANSWERS[:count])
-    assert typed("init", *silent, "-o", "x", status=2).stderr.endswith("bushfit: aborted\n")
-    assert not (tmp_path / "x").exists()
-
-
-@pytest.mark.parametrize("option", ["--no-input", "--json", "--quiet"])
-def test_programs_are_asked_nothing(typed, silent, tmp_path, monkeypatch, option):
-    person = answering(monkeypatch, *ANSWERS)
-    refused(typed("init", *silent, option, "-o", "x", status=2), tmp_path / "x", "there is no column for the time")
-    assert person.tell() == 0
 
 
 def test_a_file_that_names_a_direction_is_no_block_in_shear(typed, tests, tmp_path):

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
-from shell import BUSHING, GEOMETRY, names, refused
+from shell import BUSHING, names, refused
 
 from bushfit.campaign.campaign import load_campaign
 
@@ -99,23 +99,6 @@ def test_the_unit_tells_frequency_from_force(typed, tmp_path, header):
     assert "from 5 to 45 Hz" in done.stderr
 
 
-@pytest.mark.parametrize(
-    ("header", "options", "said", "unsaid"),
-    [
-        ("amplitude [mm]", (), f"{ASSUMED} peak-to-peak", "half of"),
-        ("Pegel [mm]", ("--column", "amplitude=Pegel"), ASSUMED, "half of"),
-        ("Amplitude SS [mm]", (), '0.05 mm zero-to-peak, half of "Amplitude SS [mm]", which is peak', "is assumed"),
-        ("Pegel", ("--column", "amplitude=Pegel", "--unit", "amplitude=mmpp"), 'half of "Pegel"', "is assumed"),
-        ("amplitude [mm]", ("--amplitude", "peak-to-peak"), 'half of "amplitude [mm]"', "is assumed"),
-        ("amplitude 0-p [mm]", (), "0.1 mm zero-to-peak", "is assumed"),
-    ],
-)
-def test_how_amplitudes_are_counted_is_said(typed, tmp_path, header, options, said, unsaid):
-    done = typed("inspect", *sweeps(tmp_path, f"f [Hz],{header},stiffness [N/mm],eta"), "--no-plots", *options)
-    assert said in done.stderr
-    assert unsaid not in done.stderr
-
-
 def test_a_column_is_named_where_it_stands_and_the_text_holds_in_any_folder(typed, tmp_path, root):
     files = sweeps(tmp_path, *(f"f [Hz],{level} [mm],stiffness [N/mm],eta" for level in ("Pegel SS", "amplitude")))
     done = typed("inspect", *files, "--no-plots", "--column", "amplitude=Pegel SS [mm]")
@@ -137,16 +120,3 @@ def test_a_column_is_named_where_it_stands_and_the_text_holds_in_any_folder(type
     (tmp_path / "elsewhere/campaign.toml").write_text(BUSHING + done.stdout, encoding="utf-8")
     (loop,) = load_campaign(tmp_path / "elsewhere/campaign.toml").loops
     assert loop.time.size == 2001
-
-
-@pytest.mark.parametrize(
-    ("levels", "said"),
-    [
-        (("amplitude", "amplitude"), ('axial_0.csv, line 1: there is no column "Pegel SS"', "the header that")),
-        (("Pegel SS", "Niveau"), ("axial_1.csv, line 1", '--column "amplitude=Niveau [mm]"', "--at-amplitude")),
-    ],
-)
-def test_a_column_that_no_file_has_is_refused(typed, tmp_path, levels, said):
-    files = sweeps(tmp_path, *(f"f [Hz],{level} [mm],stiffness [N/mm],eta" for level in levels))
-    done = typed("init", *files, *GEOMETRY, "--column", "amplitude=Pegel SS", "-o", "x", status=2)
-    refused(done, tmp_path / "x", *said, "try: ")

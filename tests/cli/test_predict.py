@@ -1,8 +1,6 @@
 """plan, predict and compare as typed: what is planned, grids, measurements laid over, results side by side."""
 
 import json
-from collections import Counter
-from itertools import groupby
 from pathlib import Path
 
 import numpy as np
@@ -106,12 +104,6 @@ def test_predict_says_each_warning_once_and_in_its_document(bushfit, root, tmp_p
         warnings = json.loads(done.stdout)["warnings"]
         assert sorted(f"warning: {line}" for line in warnings) == sorted(printed)
         assert any(said in line for line in warnings)
-
-
-@pytest.mark.parametrize(("grid", "is_warned"), [((), False), (("--amplitudes", "0.3 mm"), True)])
-def test_a_measured_sweep_confirms_strains_that_were_not_fitted(bushfit, tmp_path, grid, is_warned):
-    files = "model/model.json", "--campaign", CAMPAIGN, *grid, "-o", tmp_path / "x", "--no-plots", "-v"
-    assert ("radial: predicted at strains" in bushfit("predict", *files).stderr) is is_warned
 
 
 def test_predict_writes_maxwell_arms_where_asked(bushfit, root, tmp_path):
@@ -224,27 +216,6 @@ parameters = { mu = "1.09 MPa", m = "0.2 MPa*s^alpha", alpha = 0.24, sigma_fmax 
 """
 
 
-@pytest.mark.parametrize(
-    ("hours", "fewest", "order"),
-    [("2.5", 5, ("two blocks", "mount")), ("4", 10, ("mount", "two blocks"))],
-    ids=["stated", "asked"],
-)
-def test_specimens_are_mounted_once_in_their_order_and_each_tells_its_scatter(typed, tmp_path, hours, fewest, order):
-    """As the campaign lists them, or as asked for. Each is on a rig of its own, of which repeats have to tell."""
-    (tmp_path / "plan.toml").write_text(SPECIMENS, encoding="utf-8")
-    asked = [word for name in order for word in ("--direction", name)] if order[0] == "mount" else []
-    done = typed("plan", "plan.toml", "--hours", hours, *asked, "--no-plots", "--json", "-o", "x")
-    runs = json.loads(done.stdout)["tests"]
-    assert [name for name, _ in groupby(run["place"] for run in runs)] == [*order]
-    for name in order:
-        first, *others = mine = [{**run, "minutes": 0.0} for run in runs if run["place"] == name]
-        minutes = [run["minutes"] for run in runs if run["place"] == name]
-        assert minutes[0] == pytest.approx(30.0 + minutes[1 + others.index(first)])  # to mount it
-        swept = Counter((*map(tuple, (run["amplitudes"], run["frequencies_Hz"])),) for run in mine if run["stepped"])
-        steps = {test: max(map(len, test)) for test in swept}
-        assert sum((count - 1) * (steps[test] - 1) for test, count in swept.items() if steps[test] > 2) >= fewest
-
-
 def test_a_plan_for_targets_stops_once_they_are_met(root, tmp_path):
     """In less than half of the hours, in every direction whose stiffness is asked for, and said; what is not asked for
     is not planned, and tighter targets take longer."""
@@ -293,13 +264,6 @@ def test_what_keeps_a_target_from_being_met_is_named(root, tmp_path, source, opt
     assert not found["met"]
     assert found["why"] in done.stderr.replace("\n", " ")
     assert f"these targets are not met: {name}" in done.stderr.replace("\n", " ")
-
-
-def test_no_test_is_planned_for_what_is_known(bushfit, tmp_path):
-    done = bushfit("plan", CAMPAIGN, "--target", "mu=20 %", "-o", tmp_path)
-    assert "no test is needed" in done.stderr
-    assert names(tmp_path) == {"plan.json", "plan.csv"}
-    assert pd.read_csv(tmp_path / "plan.csv").empty
 
 
 def test_where_nothing_was_tested_alike_the_compound_is_compared(bushfit, root, tmp_path):

@@ -10,10 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from commandline import typing
-from shell import document, refused
-
-from bushfit.geometry import Specimen
-from bushfit.report.results import place_names
+from shell import refused
 
 N = 200
 TIME = np.arange(N) / 200.0
@@ -170,11 +167,6 @@ def test_the_axial_formula_of_an_untested_bushing_is_that_of_a_tested_one(shapes
     assert "formula" not in done.stderr
 
 
-def test_files_of_bushings_differ_where_a_system_ignores_case():
-    names = place_names([Specimen("Long", "modulus"), Specimen("long", "modulus")])
-    assert names[0].casefold() != names[1].casefold()
-
-
 def written(root: Path, folder: Path, name: str, tables: str) -> Path:
     """A campaign of the package without its ties, priors and simulation, with further tables; bodies have odd names."""
     text = (root / f"configs/{name}.toml").read_text(encoding="utf-8").replace("../data", f"{root}/data")
@@ -207,15 +199,6 @@ def test_an_impossible_tie_is_one_error_with_file_and_parameter(bushfit, root, t
 
 
 @pytest.mark.parametrize(
-    "tie", ['equal = "stiffness_factor.x-1"', 'expression = "2 * stiffness_factor.x-1-stiffness_factor.x-1"']
-)
-def test_bodies_of_any_name_stand_in_a_tie(bushfit, root, tmp_path, tie):
-    bushfit("fit", written(root, tmp_path, "three_shapes", f"[{LONG}]\n{tie}"), "-o", tmp_path / "x", "--no-plots")
-    parameters = document(tmp_path / "x/model.json")["parameters"]
-    assert parameters["stiffness_factor.front left"]["value"] == parameters["stiffness_factor.x-1"]["value"]
-
-
-@pytest.mark.parametrize(
     ("command", "tie", "said"),
     [
         ("fit", '[fit.m]\nexpression = "1e6 * inertia.mass"', "is not used: the model lacks inertia.mass"),
@@ -228,40 +211,3 @@ def test_a_tie_that_is_not_used_or_constant_is_reported(bushfit, root, tmp_path,
     campaign = written(root, tmp_path, "cmp_15961_prior", tie)
     done = bushfit(command, campaign, "-o", tmp_path / "x", "--no-plots", "-v")
     assert any(" ".join(line.split()).endswith(said) for line in done.stderr.splitlines())
-
-
-@pytest.mark.parametrize("prior", [".24 +- .003", "+0.24 ± 3e-3", "24 % +/- 0.3 %"])
-def test_numbers_of_a_prior_are_written_in_any_way(bushfit, root, tmp_path, prior):
-    campaign = written(root, tmp_path, "cmp_15961_prior", f'[fit.alpha]\nprior = "{prior}"')
-    bushfit("fit", campaign, "-o", tmp_path / "x", "--no-plots")
-    stated = document(tmp_path / "x/model.json")["parameters"]["alpha"]["prior"]
-    assert (stated["source"], stated["mean"]) == (prior, 0.24)
-    assert stated["deviation"] == pytest.approx(0.003)
-
-
-@pytest.mark.parametrize(("keys", "spread"), [('prior = "1 +- 0.08"', 0.08), ("max = 1.2", 0.03)])
-def test_the_spread_of_a_new_bushing_is_that_of_the_priors(bushfit, root, tmp_path, keys, spread):
-    """A limit alone leaves the prior of a free factor as it is."""
-    tables = "\n".join(f'[fit."stiffness_factor.{name}"]\n{keys}' for name in ("x", "front left", "x-1"))
-    bushfit("fit", written(root, tmp_path, "three_shapes", tables), "-o", tmp_path / "m", "--no-plots")
-    new = ("--bushing", root / "configs/new_bushing.toml", "--direction", "axial")
-    done = bushfit("predict", tmp_path / "m", *new, "-o", tmp_path / "x", "--no-plots", "-v")
-    assert f"the bands include {100 * spread:g} % of stiffness" in " ".join(done.stderr.split())
-    table = pd.read_csv(tmp_path / "x/axial.csv")
-    half = table["stiffness [N/mm], high"] / table["stiffness [N/mm]"] - 1.0
-    assert half.min() == pytest.approx(1.96 * spread * (1.0 + 1.0 / 3.0) ** 0.5, rel=0.15)
-
-
-def test_a_tie_and_a_prior_of_a_branch_end_where_a_search_replaces_it(bushfit, root, tmp_path):
-    tables = '[fit.sigma_fmax]\nexpression = "0.014 * mu"\n[fit.eps_half]\nprior = "0.013 +- 0.001"'
-    campaign = written(root, tmp_path, "cmp_15961_prior", tables)
-    bushfit("diagnose", campaign, "-o", tmp_path / "x", "--no-plots")
-    assert document(tmp_path / "x/diagnosis.json")["verdict"] == "consistent"
-
-
-def test_a_profile_contains_errors_that_the_weights_do_not(bushfit, root, tmp_path):
-    """A tie determines alpha far better than the gain of the loop, which is assumed, allows."""
-    campaign = written(root, tmp_path, "cmp_15961_prior", '[fit.m]\nexpression = "0.18 * mu"')
-    bushfit("fit", campaign, "--profile", "-o", tmp_path / "x", "--no-plots")
-    alpha = document(tmp_path / "x/model.json")["parameters"]["alpha"]
-    assert alpha["profile95"] == pytest.approx(alpha["ci95"], rel=0.01)

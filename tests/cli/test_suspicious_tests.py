@@ -4,13 +4,12 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
-from shell import CAMPAIGN, document
+from shell import CAMPAIGN
 
 from bushfit.model.file import load_result
 
 LOOP = "data/cmp_15961/loop_axial_1.csv"
 SWEEP = "data/cmp_15961/sweep_axial.csv"
-SWEEP_TEST, LOOP_TEST = "sweep_axial", "loop_axial_1"
 
 
 @pytest.fixture
@@ -38,26 +37,3 @@ def test_copies_count_once(bushfit, own, once, command):
     single, copied = (load_result(own / folder / "model.json") for folder in ("once", "copied"))
     assert vars(copied.model)["values"] == vars(single.model)["values"]
     assert copied.covariance.stderr("m") == single.covariance.stderr("m")
-
-
-@pytest.mark.parametrize(
-    ("test", "stated", "wrong", "mistake"),
-    [
-        (SWEEP_TEST, "stiffness [N/mm]", "stiffness [N/m]", "thousandfold_force"),
-        (SWEEP_TEST, "stiffness [N/mm]", "stiffness [kN/mm]", "thousandth_of_force"),
-        pytest.param(
-            *(SWEEP_TEST, "amplitude [mm]", "amplitude [um]", "thousandfold_displacement"), marks=pytest.mark.slow
-        ),
-        pytest.param(*(LOOP_TEST, "force [N]", "force [mN]", "thousandfold_force"), marks=pytest.mark.slow),
-    ],
-)
-def test_the_unit_and_not_another_test_is_named(bushfit, own, test, stated, wrong, mistake):
-    file = own / f"data/cmp_15961/{test}.csv"
-    pd.read_csv(file, comment="#").rename(columns={stated: wrong}).to_csv(file, index=False)
-    bushfit("diagnose", own / CAMPAIGN, "-o", own / "x", "--no-plots")
-    diagnosis = document(own / "x/diagnosis.json")
-    assert diagnosis["verdict"] == "named"
-    assert [(effect["name"], effect["test"]) for effect in diagnosis["effects"]] == [(mistake, test)]
-    adopted = f"{mistake}:{test}"
-    bushfit("diagnose", own / CAMPAIGN, "--adopt", adopted, "-o", own / "adopted", "--no-plots")
-    assert document(own / "adopted/diagnosis.json")["verdict"] == "consistent"

@@ -30,12 +30,9 @@ from bushfit.geometry import Direction, stiffness_per_modulus, unit_strain
 from bushfit.model.file import from_document, to_document
 from bushfit.model.model import Model
 from bushfit.model.result import Range, Result
-from bushfit.model.transfer import transfer_compound
 from bushfit.prediction.caveats import caveats
-from bushfit.prediction.resonance import predict_resonance
 from bushfit.prediction.stiffness import predict
 from bushfit.report.results import to_json
-from bushfit.units import number
 
 FREQUENCIES, AMPLITUDES = np.geomspace(5.0, 155.0, 9), np.geomspace(1e-4, 5e-4, 5)
 #: How much stiffer the radial tests are than the axial ones predict, of the bushing or of the rig.
@@ -150,20 +147,6 @@ def test_bands_hold_each_model_that_may_be_right(measured):
     np.testing.assert_array_equal(predict(again, Direction.RADIAL, FREQUENCIES, AMPLITUDES).stiffness.low, band.low)
 
 
-def test_they_are_told_of_a_resonance_and_stay_with_a_compound_that_is_carried(measured):
-    result = asked(changed(measured(), 1, STIFFER)).result
-    shaken = Direction.RADIAL, 50.0, 1.0, np.linspace(30.0, 80.0, 501)
-    peaks = [predict_resonance(Result(each.model), *shaken).peak[0] for each in result.alternatives]
-    (line,) = (line for line in predict_resonance(result, *shaken).warnings if "that agree" in line)
-    assert f"{number(min(peaks), 4)} to {number(max(peaks), 4)} Hz" in line
-    other, _ = transfer_compound(
-        replace(result, warnings=(*result.warnings, *result.undecided)), replace(result.model.bushing, name="x")
-    )
-    said = caveats(other)
-    assert not any("the prediction uses the plain model" in line for line in (*other.warnings, *said))
-    assert any("permit other values of the parameters" in line for line in said)
-
-
 def test_at_a_node_a_correction_has_the_value_and_the_two_errors_of_the_node(paper_model):
     rows = ((20.0, 200.0), (0.01, 0.01), (0.05, 0.02), (0.01, 0.0), (0.004, 0.004), (0.02, 0.02))
     data = Unnamed(0.1, (0.3, 0.3), (Patch(("axial",), *rows),))
@@ -172,15 +155,6 @@ def test_at_a_node_a_correction_has_the_value_and_the_two_errors_of_the_node(pap
     assert value == pytest.approx([0.05 + 0.01j, 0.02], rel=1e-3)
     np.testing.assert_allclose(errors, [[0.004, 0.004], [0.02, 0.02]], rtol=1e-2)
     assert weight.tolist() == [1.0, 1.0]
-
-
-def test_what_was_corrected_counts_as_error_where_the_compound_is_carried(paper_model):
-    rows = ((5.0, 155.0), (0.001, 0.1), (0.05, 0.05), (0.0, 0.0), (0.001, 0.001), (0.001, 0.001))
-    data = Unnamed(0.05, (2.0, 2.0), (Patch(("axial", "radial"), *rows),))
-    corrected = Result(replace(paper_model, effects=(*paper_model.effects, "unnamed"), unnamed=data))
-    other, _ = transfer_compound(corrected, replace(paper_model.bushing, name="x"))
-    band = predict(other, Direction.AXIAL, [20.0], [2e-4]).stiffness
-    assert (band.high - band.value) / band.value > 0.05
 
 
 @pytest.mark.slow
@@ -272,14 +246,6 @@ def test_derivatives_beside_a_large_term(residuals, measure, measured, fitted):
     ends = [term.residual(value * (1.0 + off), model) for off in (step, -step)]
     row = columns[0, 0]
     assert row == pytest.approx((ends[0] - ends[1]) / (2.0 * step), rel=1e-5, abs=1e-5 * np.abs(row).max())
-
-
-def test_a_resonance_is_no_power_law(measured, fitted):
-    def resonance(frequency: Array, amplitude: Array, _: Array) -> Array:
-        ratio = frequency / 80.0
-        return 120e3 * ratio**2 / (1.0 - ratio**2 + 0.3j * ratio) * np.ones_like(amplitude)
-
-    assert not surely(with_term(measured(), resonance), fitted).is_likely
 
 
 @pytest.mark.slow

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from fits import joint_fit
 from hidden import hidden_campaign, hideable
-from rigged import BOTH, PLAN, changed, in_closed_form
+from rigged import BOTH, PLAN, in_closed_form
 from tries import some
 
 from bushfit.campaign.campaign import Campaign
@@ -55,16 +55,6 @@ def test_effects_without_a_law_in_time_are_recovered_from_their_first_harmonic(n
     assert 0.85 < agrees(result, truth.values) < 1.15
 
 
-@pytest.mark.slow
-def test_a_second_relaxation_is_no_other_effect(diagnosed):
-    """Two are named, or described where the two cannot be told from one of another shape; one is one."""
-    one = {"maxwell": {"mu1": 3e5, "tau": 2e-2}}
-    two = {**one, "second_maxwell": {"mu1": 6e5, "tau": 8e-4}}
-    found = [[effect.name for effect in diagnosed(effects, seed=3).effects] for effects in (two, one)]
-    assert found[0] in (["maxwell", "second_maxwell"], ["unnamed"])
-    assert found[1] == ["maxwell"]
-
-
 def agrees(result: Result, truths: Mapping[str, float]) -> float:
     """Reduced chi-square of a fit whose values have to be the true ones."""
     reduced = result.quality.reduced_chi_square
@@ -85,16 +75,6 @@ def test_a_small_effect_is_not_taken_for_one_at_rest_on_its_bound(measured, name
     interval = result.interval(name)
     assert not any("edge" in line for line in result.warnings)
     assert interval[0] <= SMALL[name] <= interval[1]
-
-
-def test_what_the_data_push_below_zero_rests_on_its_bound(measured):
-    """Loss that shrinks in proportion to frequency, as of a late force, is no dashpot."""
-    campaign = measured()
-    for number, sweep in enumerate(campaign.sweeps):
-        campaign = changed(campaign, number, np.exp(-2j * np.pi * sweep.frequency * 1e-4))
-    result = joint_fit(campaign, effects=(*BASE, "viscous"), directions=BOTH)
-    assert result.model.values["viscous.eta"] == pytest.approx(0.0, abs=1e-6)
-    assert any("viscous.eta ended at a limit" in line for line in result.warnings)
 
 
 TRUTHS: dict[str, dict[str, float]] = {
@@ -166,15 +146,3 @@ def test_known_families_are_each_law_of_rate_with_each_of_amplitude(paper_model,
     assert at_temperatures == ("temperature", *(f"temperature+{name}" for name in found))
     kraus = paper_model.with_effect("kraus")
     assert not any("kraus" in name or "sliders" in name for name in known_families(kraus, tests))
-
-
-@pytest.mark.slow
-def test_the_likeliest_of_all_families_are_held_out(paper_model):
-    """Kraus' law with a spring in series with the springpot: it leads, or what leads has both in it."""
-    made = paper_model.with_effect("kraus", {f"kraus.{key}": value for key, value in TRUTHS["kraus"].items()})
-    made = made.with_effect("fractional_zener", {"fractional_zener.c": 0.5})
-    found, left = fit_families(*begun(paper_model, measure(in_closed_form(made, PLAN), PLAN).campaign()), (), (), {})
-    assert 2 <= len(found) <= 6
-    assert found[0].name == "paper"
-    assert sum(family.probability for family in found) + sum(left.values()) == pytest.approx(1.0)
-    assert max(found, key=lambda family: family.probability).name == "fractional_zener+kraus"

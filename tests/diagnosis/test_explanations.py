@@ -14,13 +14,12 @@ from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.explanations import Explanation
 from bushfit.diagnosis.faulty_parts import find_faulty_parts, is_pattern
 from bushfit.diagnosis.linear_model import LinearModel
-from bushfit.diagnosis.propose import parameter_basis, proposals, scores, sensitivity
+from bushfit.diagnosis.propose import proposals
 from bushfit.diagnosis.rig_errors import in_scatter_units, rig_errors
-from bushfit.diagnosis.smooth_deviations import compound, compound_shapes
+from bushfit.diagnosis.smooth_deviations import compound_shapes
 from bushfit.effects import BASE, LIBRARY
 from bushfit.fitting.preparation import split_by_kind
 from bushfit.fitting.problem import FitResult
-from bushfit.geometry import Direction
 
 SHARED_RIG = RigSettings(gain_error=4e-3, phase_error=3.5e-3)
 
@@ -70,30 +69,6 @@ def test_every_effect_is_proposed_but_twins_and_what_the_tests_do_not_state(bare
     assert not found.keys() & twins
     temperature = found["temperature"]  # none is stated
     assert (temperature.score, temperature.visible) == (0.0, False)
-
-
-def test_scores_are_those_of_a_linear_refit(bare):
-    """Chi-square of the residual regressed on the model's Jacobian, less that on Jacobian and column."""
-    random = np.random.default_rng(0)
-    residual, own = random.standard_normal(bare.residual.size), bare.jacobian
-    columns = random.standard_normal((3, residual.size)) * np.array([[1e-3], [1.0], [1e3]])
-    before = np.linalg.lstsq(own.T, residual, rcond=None)[1]
-    for column, gain, amount, seen in zip(columns, *scores(columns, residual, parameter_basis(own)), strict=True):
-        answer, after, *_ = np.linalg.lstsq(np.vstack((own, column)).T, residual, rcond=None)
-        assert seen
-        assert gain == pytest.approx(float((before - after)[0]), rel=1e-6)
-        assert amount == pytest.approx(-answer[-1], rel=1e-6)
-
-
-def test_beside_a_compound_that_deviates_the_strain_of_each_direction_is_inexact(bare):
-    """By five times its deviation, as one strain stands for an uneven field; only where there are two directions."""
-    columns = compound(bare).columns
-    (change,) = sensitivity(bare.model, bare.data_sets, LIBRARY["strain_scale.radial"])[1]
-    change *= 5.0 / LIBRARY["strain_scale.radial"].amount.typical
-    assert np.linalg.norm(columns[:, : change.size] - change, axis=1).min() < 0.02 * np.linalg.norm(change)
-    axial = tuple(test for test in bare.data_sets if test.direction == Direction.AXIAL)
-    one = bare.reevaluate(bare.model, axial)
-    assert len(compound(one).columns) == len(columns) - 2
 
 
 def test_the_compound_bends_a_loop_in_odd_overtones_and_in_the_first_cycle(bare):

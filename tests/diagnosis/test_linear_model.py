@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.special import logsumexp
-from scipy.stats import kstest, multivariate_normal, norm
+from scipy.stats import multivariate_normal, norm
 
 from bushfit.diagnosis.explanations import Group
 from bushfit.diagnosis.linear_model import LinearModel
@@ -163,37 +163,3 @@ def test_amounts_are_those_of_a_dense_posterior(number):
     mean, spread = of.amounts(number)
     assert mean == pytest.approx(expected, rel=1e-5)
     assert spread == pytest.approx(np.einsum("k,kij->ij", share, seconds) - np.outer(expected, expected), rel=1e-5)
-
-
-def test_errors_of_parameters_are_those_of_a_dense_posterior():
-    """Mean and covariance beside errors of the rig and a compound that deviates, mixed by evidence."""
-    plain = ledger(5, groups=False)
-    columns = np.random.default_rng(5).normal(size=(2, plain.residual.size))
-    cases = [replace(case, compound=size) for case in CASES[:2] for size in (0.0, 0.5)]
-    of = replace(plain, rig=RigErrors(plain.rig.blocks, cases), compound=Group(columns, np.eye(2), act_together=True))
-    log_weights, means, seconds, own = [], [], [], of.precision == 0.0
-    for case in cases:
-        whole = covariance(of, case) + case.compound**2 * columns.T @ columns
-        log_weights.append(case.log_weight + restricted(of, whole))
-        rows, noise = of.jacobian, whole - (of.jacobian[~own].T / of.precision[~own]) @ of.jacobian[~own]
-        spread = np.linalg.inv(rows @ np.linalg.solve(noise, rows.T) + np.diag(of.precision))
-        shift = spread @ rows @ np.linalg.solve(noise, of.residual)
-        means.append(-shift)
-        seconds.append(spread + np.outer(shift, shift))
-    share = np.exp(log_weights - logsumexp(log_weights))
-    expected = share @ np.array(means)
-    mean, errors = of.parameters()
-    assert mean == pytest.approx(expected, rel=1e-5)
-    assert errors == pytest.approx(np.einsum("k,kij->ij", share, seconds) - np.outer(expected, expected), rel=1e-5)
-
-
-@pytest.mark.parametrize("node", range(2))
-def test_the_chance_of_clean_tests_is_even(node):
-    """Drawn as the ledger says; with several nodes sizes adapt themselves, and extremes are rarer."""
-    of, random = ledger(7, groups=False, rows=14), np.random.default_rng(2)
-    noise = np.linalg.cholesky(covariance(of, CASES[node]))
-    drawn = [noise @ random.normal(size=of.residual.size) for _ in range(200)]
-    alone = [replace(of, residual=row, chosen_cases=np.array([node])).p_value() for row in drawn]
-    every = [replace(of, residual=row).p_value() for row in drawn]
-    assert kstest(alone, "uniform").pvalue > 1e-3
-    assert np.mean(np.array(every) < 0.05) < 0.09

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from rigged import INERTIA, LEVELS, SHARED, SLIP, TWO, Effects
+from rigged import INERTIA, LEVELS, SHARED, TWO, Effects
 
 from bushfit.diagnosis.fits import fit_model
 from bushfit.diagnosis.holdout import hold_out, hold_out_parts
@@ -21,10 +21,6 @@ def one(found: tuple[MisfitRegion, ...], direction: str, component: str) -> Misf
     """The region of a direction and a part."""
     (where,) = [where for where in found if (where.direction, where.component) == (direction, component)]
     return where
-
-
-def test_a_clean_campaign_has_no_place(measured, fitted):
-    assert find_regions(fitted(measured(plan=SHARED))) == ()
 
 
 @pytest.fixture(scope="module")
@@ -56,14 +52,6 @@ def test_trends(where_of, effects, direction, component, trend):
     assert where.frequency[1] == pytest.approx(155.0)
     assert where.frequency[0] > 90.0
     assert where.amplitude == pytest.approx((LEVELS[0], LEVELS[-1]))
-
-
-def test_slip_shows_at_the_smallest_amplitude_and_in_odd_harmonics(where_of):
-    found = where_of(SLIP)
-    loss = one(found, "axial", "loss")
-    assert loss.amplitude == pytest.approx((LEVELS[0], LEVELS[0]))
-    assert "at 0.1 mm" in loss.reading
-    assert any("third harmonic" in where.reading for where in found if where.kind == "loop")
 
 
 @pytest.mark.parametrize(
@@ -98,26 +86,3 @@ def test_the_gap_is_that_of_a_refit(measured, fitted, hidden, effects, which):
     # the parts of a block that is cut in two share an error, which whitening then treats apart
     assert found.after == pytest.approx(expected, rel=0.05)
     assert effects or "third" not in which or found.after > 1.05 * as_fitted
-
-
-def test_the_prediction_s_own_error_is_that_of_a_sandwich_of_runs_and_loops(measured, fitted):
-    """In full, by parameters: A^-1 M A^-1, M of what each run and each loop of the rest pulls, and at least A."""
-    evidence, which = fitted(measured(INERTIA, SHARED)), "amplitude level 3"
-    (found,) = [part for part in hold_out(evidence, evidence, {}).parts if part.part == which]
-    rows = next(part for part in hold_out_parts(evidence.data_sets) if part.name == which).rows(evidence.data_sets)
-    slopes, left = evidence.jacobian, evidence.residual
-    pairs = [
-        (data, getattr(data, "held_value", np.zeros(data.size // data.residuals_per_point)))
-        for data in evidence.data_sets
-    ]
-    lines = np.concatenate([np.tile(held, data.residuals_per_point) for data, held in pairs])
-    tests = np.repeat(np.arange(len(pairs)), [data.size for data, _ in pairs])
-    root = np.linalg.inv(np.linalg.cholesky(slopes[:, ~rows] @ slopes[:, ~rows].T))
-    left = left - slopes.T @ (root.T @ root @ slopes[:, ~rows] @ left[~rows])
-    groups = {(test, line): (tests == test) & (lines == line) & ~rows for test, line in zip(tests, lines, strict=True)}
-    pulls = np.array([root @ slopes[:, group] @ left[group] for group in groups.values()])
-    size, vectors = np.linalg.eigh(pulls.T @ pulls)
-    error = slopes[:, rows].T @ root.T @ vectors * np.sqrt(np.maximum(size, 1.0))
-    whole = np.eye(int(rows.sum())) + error @ error.T
-    expected = np.sqrt(left[rows] @ np.linalg.solve(whole, left[rows]) / len(whole))
-    assert found.whitened == pytest.approx((expected, expected), rel=1e-6)

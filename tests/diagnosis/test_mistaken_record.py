@@ -3,7 +3,6 @@
 A sweep in one file, or with a file for each level as many rigs write it, is the same to a diagnosis.
 """
 
-import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -108,21 +107,6 @@ def test_where_no_fit_can_begin_the_option_is_offered_that_corrects_the_unit(tru
     assert asked(campaign, adopt=(truth,)).verdict == "consistent"
 
 
-@pytest.mark.slow
-def test_what_cannot_be_told_apart_is_ambiguous(measured):
-    """Loops in kgf, or sweeps multiplied by 9.81 once too often: the same ratio."""
-    diagnosis = asked(in_kilograms(measured(None, SHARED)))
-    assert diagnosis.verdict == "ambiguous"
-    assert diagnosis.effects[0].name == "kilogram_force", "rubber of 1 MPa and not of 0.1"
-    assert diagnosis.odds.explanations[0][1] > 5.0 * diagnosis.odds.explanations[1][1]
-    alike = {" + ".join(effect.label for effect in diagnosis.effects), *diagnosis.effects[0].alternatives}
-    assert alike == {
-        "kilogram_force:loop_axial_1 + kilogram_force:loop_axial_2",
-        "twice_in_newton:sweep_axial + twice_in_newton:sweep_radial",
-    }
-    assert diagnosis.after is diagnosis.before
-
-
 def test_what_all_tests_share_is_not_seen_and_not_named(measured):
     """All forces in kgf are all moduli 9.81 times too small: the tests agree."""
     campaign = in_kilograms(measured(None, SHARED))
@@ -134,42 +118,12 @@ def diagnosed(campaign: Path) -> Diagnosis:
     return diagnose(load_campaign(campaign)).diagnosis
 
 
-def parted(case: Path, folder: Path) -> tuple[Path, Path]:
-    """Campaigns of the sweeps of a case with hum: one file each, and one a level."""
-    head, *sweeps = re.split(r"(?m)^(?=\[\[sweeps\]\])", (case / "bushing.toml").read_text(encoding="utf-8"))
-    head = head.replace('file = "', f'file = "{case.as_posix()}/')
-    whole, levels = [head], [head]
-    for text in sweeps:
-        name = re.findall(r'file = "(.*)"', text)[0]
-        table = pd.read_csv(case / name, comment="#")
-        hum(table, name)
-        table.to_csv(folder / name, index=False)
-        whole.append(text)
-        amplitude = next(header for header in table if header.startswith("amplitude"))
-        for number, (_, rows) in enumerate(table.groupby(amplitude)):
-            rows.to_csv(folder / f"{number}_{name}", index=False)
-            levels.append(text.replace(name, f"{number}_{name}"))
-    files = folder / "whole.toml", folder / "levels.toml"
-    for file, texts in zip(files, (whole, levels), strict=True):
-        file.write_text("\n".join(texts), encoding="utf-8")
-    return files
-
-
 def hum(table: pd.DataFrame, name: str) -> None:
     """4 % at one frequency of the axial sweep, at every amplitude."""
     if "axial" in name:
         steps = sorted(set(table["frequency [Hz]"]))
         size = next(header for header in table if "stiffness" in header)
         table.loc[table["frequency [Hz]"] == steps[len(steps) // 2], size] *= 1.04
-
-
-@pytest.mark.slow
-def test_verdict_does_not_depend_on_how_sweeps_are_parted(root, tmp_path):
-    """Nor the odds of what is told: a disturbance at one frequency."""
-    one, many = map(diagnosed, parted(root / "data/practice/case_000", tmp_path))
-    assert many.verdict == one.verdict == "unexplained"
-    assert many.effects == one.effects == ()
-    assert [found.odds.explanations[0][0].count("Hz in axial") for found in (one, many)] == [1, 1]
 
 
 def swept(loss: float, direction: Direction = Direction.AXIAL, magnitude: float = 5e5) -> Sweep:

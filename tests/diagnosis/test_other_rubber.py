@@ -114,18 +114,3 @@ def test_the_interval_of_a_rig_fault_includes_what_the_rubber_may_imitate(
     assert low <= truth <= high
     assert (high - low) / 2.0 < sharpest * truth, "and it still determines the fault"
     assert min(shares) >= 0.9
-
-
-def test_bands_include_explanations_that_are_nearly_as_probable(rubber, paper_model):
-    """A sleeve of 0.02 mm/kN, which this rubber and the formula of one direction may imitate."""
-    diagnosis = asked(rubber(lambda k, _: k / (1.0 + 2e-8 * k)))
-    shares = coverage(diagnosis, paper_model.bushing)
-    print(diagnosis.verdict, diagnosis.odds.labels, shares)
-    assert min(shares) >= 0.9
-
-
-def test_an_adopted_effect_opens_no_other_explanation(rubber):
-    found, adopted = asked(rubber()), asked(rubber(), adopt=("force_offset",))
-    print(found.verdict, found.odds.labels, adopted.verdict, adopted.odds.labels)
-    assert "force_offset" in {effect.name for effect in found.effects}
-    assert adopted.odds.labels[0] == found.odds.labels[0].replace("force_offset + ", "")

@@ -166,20 +166,6 @@ def asked(tests: Undisturbed) -> list[Diagnosis]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("reached", "seen"), [(0.9, 1.0), (0.3, 0.3)])
-def test_a_level_of_another_amplitude_is_to_be_measured_again(clean, reached, seen):
-    """Moved by 10 % less than was read; and run at 0.15 mm, read rightly and filed under 0.5 mm."""
-    for diagnosis in asked(misread(clean, reached, seen)):
-        # the largest level may also deviate by a law of amplitude, which is described without a name
-        if diagnosis.verdict == "described":
-            assert [effect.name for effect in diagnosis.effects] == ["unnamed"]
-            continue
-        assert diagnosis.verdict in ("unexplained", "ambiguous")
-        assert "the radial level 0.5 mm" in diagnosis.next_test
-        assert all(diagnosis.verdict == "ambiguous" and named.alternatives for named in diagnosis.effects)
-
-
-@pytest.mark.slow
 def test_a_wrong_strain_scale_is_named(truth):
     """By as much as finite elements of this shape say of Eq. 8."""
     scale = 0.74

@@ -10,13 +10,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from rigged import SHARED, SMALLER, asked, said
+from rigged import SHARED, asked, said
 
-from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.explanations import Explanation
 from bushfit.diagnosis.hypotheses import Hypothesis
 from bushfit.diagnosis.next_test import BUSHING_TESTS, FIXTURE_TESTS, deciding_test, remaining_entropy
-from bushfit.diagnosis.report_text import _may_be_absent
 from bushfit.diagnosis.verdict import Finding, decide_verdict
 from bushfit.effects import BASE
 from bushfit.effects.mistakes import MISTAKES
@@ -35,34 +33,6 @@ SLIP = {"interface_slip.force": 2.0}
 SECOND = {"second_friction.sigma_fmax": 2e3, "second_friction.eps_half": 5e-4}
 STOP = {"bump_stop.gap": 4e-4, "bump_stop.stiffness": 1e5}
 TOLERANCE = 0.01
-
-
-def test_the_class_of_a_rig_that_is_assumed_is_said(measured):
-    campaign = SMALLER["no repeats"](measured({}, SHARED))
-    for rig, words in (
-        (RigSettings(), "0.5 % gain and 0.25 deg phase, gain and phase assumed"),
-        (RigSettings(gain_error=4e-3), "0.4 % gain and 0.25 deg phase, phase assumed"),
-        (RigSettings(gain_error=4e-3, phase_error=3.5e-3), ""),
-    ):
-        assumed = PreparedCampaign.from_campaign(replace(campaign, rig=rig)).assumptions
-        assert [note.partition(" class of the rig, ")[2] for note in assumed] == [words] * bool(words)
-
-
-@pytest.mark.parametrize(
-    ("parameter", "value", "interval", "absent"),
-    [
-        ("inertia.mass", 0.0, None, True),
-        ("inertia.mass", 0.1, None, False),
-        ("inertia.mass", 0.1, (-0.01, 0.21), True),
-        ("delay.tau", 1e-4, (0.5e-4, 1.5e-4), False),
-        ("delay.tau", -1e-4, (-3e-4, 1e-4), True),
-        ("stiffness_factor.radial", 1.02, (0.99, 1.05), True),
-        ("stiffness_factor.radial", 0.93, (0.91, 0.95), False),
-    ],
-)
-def test_an_effect_whose_amount_may_be_neutral_has_no_name(parameter, value, interval, absent):
-    result = SimpleNamespace(model=SimpleNamespace(values={parameter: value}), interval=lambda _: interval)
-    assert _may_be_absent(parameter.removesuffix(".mass").removesuffix(".tau"), result) is absent
 
 
 @pytest.mark.slow
@@ -126,13 +96,6 @@ def test_pairs(paper_model, data_sets, one, other, words):
     assert found in SENTENCES
     assert any(word in found for word in words)
     assert deciding_test(models[::-1], EVEN, data_sets) == found
-
-
-def test_the_next_test_is_within_the_limits_of_the_rig(paper_model, data_sets):
-    models = with_each(paper_model, {"viscous.eta": 60.0}, {"maxwell.mu1": 1e5, "maxwell.tau": 6e-4})
-    top = max(float(data_set.frequency.max()) for data_set in data_sets)
-    assert "highest frequency" in deciding_test(models, EVEN, data_sets)
-    assert "highest frequency" not in deciding_test(models, EVEN, data_sets, RigSettings(max_frequency=top))
 
 
 @pytest.mark.parametrize("odds", [(1.0, 1.0), (0.8, 0.2)])

@@ -5,11 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rigged import LEVELS, SHARED, SMALLER
+from rigged import LEVELS, SHARED
 
 from bushfit.campaign.schema import RigSettings
-from bushfit.diagnosis.priors import WAVES
-from bushfit.diagnosis.rig_errors import error_blocks, in_scatter_units
+from bushfit.diagnosis.rig_errors import error_blocks
 from bushfit.diagnosis.workflow import diagnose
 from bushfit.effects.contract import Array
 from bushfit.fitting.preparation import MeasuredSweep, split_by_kind
@@ -47,23 +46,6 @@ def test_what_shares_an_error_moves_together(bare, unit, kind, repeats):
         row[block.rows] = column
     best = min(embedded, key=lambda row: float(np.abs(row - wanted).max()))
     assert np.abs(best - wanted).max() < 0.02 * np.abs(wanted).max()
-
-
-def test_waves_are_independent_of_what_the_run_shares(bare):
-    """And fall in variance as the square of their order."""
-    block = next(block for block in error_blocks(bare, RIG) if block.scatters)
-    (level, *_), waves = block.columns[block.kinds == LEVEL], block.columns[block.kinds == WAVE]
-    size = np.linalg.norm(waves[:WAVES], axis=1)
-    assert np.abs(waves @ level).max() < 0.05 * np.linalg.norm(level) * size[0]
-    assert size[0] / size == pytest.approx(np.arange(1, WAVES + 1), rel=0.02)
-
-
-def test_repeated_loops_share_their_gain(measured, fitted):
-    campaign = SMALLER["no sweeps"](measured(plan=SHARED))
-    first, second = campaign.loops
-    bare = in_scatter_units(fitted(replace(campaign, loops=(first, second, replace(first, name="again")))))
-    assert sorted(block.rows.size for block in error_blocks(bare, RIG)) == [second.time.size, 2 * first.time.size]
-    assert all(block.kinds.tolist() == [LOOP] for block in error_blocks(bare, RIG))
 
 
 def test_a_zero_error_of_the_load_cell_hides_no_effect(measured):

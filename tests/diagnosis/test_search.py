@@ -3,9 +3,7 @@
 Points left out that meet at one frequency tell of a disturbance there; points that go wrong singly do not.
 """
 
-import json
 from dataclasses import replace
-from math import log
 
 import numpy as np
 import pytest
@@ -28,10 +26,6 @@ from rigged import (
 )
 
 from bushfit.campaign.campaign import Campaign
-from bushfit.campaign.schema import RigSettings
-from bushfit.diagnosis import hypotheses
-from bushfit.diagnosis.faulty_parts import outlier_clusters
-from bushfit.diagnosis.workflow import diagnose
 from bushfit.effects import BASE
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.geometry import Bushing, Direction
@@ -75,28 +69,10 @@ def test_what_one_place_alone_shows_is_to_be_measured_again(measured, tamper, pl
     assert diagnosis.odds.labels[0] == f"fault: {place}"
 
 
-def test_a_parameter_without_influence_is_no_gain(measured, fitted):
-    """The rubber's parameters have the same posterior in any unit, and a fit in which one hardly acts wins nothing."""
-    evidence = fitted(measured(INERTIA, SHARED))
-    state = hypotheses.SearchState.of_tests(hypotheses.RecordedTests(evidence, RigSettings(), (), log(0.5)))
-    expected, bare = state.log_posterior, state.bare
-    slack = replace(state)
-    vars(slack)["bare"] = replace(bare, jacobian=bare.jacobian * np.array([[1e-2], [1.0], [30.0], [1.0], [1.0]]))
-    assert slack.log_posterior == pytest.approx(expected, abs=1e-3)
-
-
 def test_a_loop_at_an_amplitude_of_its_own_may_deviate_by_a_law(measured):
     diagnosis = asked(loop_too_strong(measured(plan=SHARED)))
     assert said(diagnosis) == "described unnamed"
     assert diagnosis.summary.endswith("it is largest at the loop loop_axial_2")
-
-
-@pytest.mark.slow
-def test_a_fault_beside_an_effect_hides_neither(measured):
-    diagnosis = asked(level_too_stiff(measured(INERTIA, SHARED)))
-    assert "the axial level 0.2 mm" in diagnosis.summary
-    assert "inertia + fault: the axial level 0.2 mm" in diagnosis.odds.labels
-    assert diagnosis.odds.nothing < 1e-6
 
 
 def test_errors_of_every_level_within_the_class_are_nothing(measured):
@@ -161,19 +137,6 @@ def at(data: PreparedCampaign, *points: tuple[int, float, int]) -> list[Outlier]
     return found
 
 
-def test_odds_by_hand(left):
-    data, model = left
-    count = np.unique(np.concatenate([sweep.frequency for sweep in data.sweeps])).size
-    (three,) = outlier_clusters(at(data, (0, 65.0, 0), (0, 65.0, 1), (1, 65.0, 0)), data.sweeps, model)
-    assert three.log_odds == pytest.approx(2.0 * np.log(count))
-    assert three.outlier_distance == pytest.approx(8.0)
-    pairs = outlier_clusters(at(data, (0, 65.0, 0), (0, 65.0, 1), (1, 45.0, 0)), data.sweeps, model)
-    assert [pair.frequency[0] for pair in pairs] == [65.0]
-    assert pairs[0].log_odds == pytest.approx(-np.log(1.0 - (1.0 - 1.0 / count) ** 2))
-    assert outlier_clusters(at(data, (0, 65.0, 0), (1, 45.0, 0)), data.sweeps, model) == []
-    assert outlier_clusters([], (), model) == []
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("shape", [(10, 18, 68), (12, 30, 50), (20, 30, 30)], ids=str)
 def test_a_radial_stiffness_off_the_formula_is_not_blamed_on_the_rig(reference_shapes, paper_model, shape):
@@ -219,14 +182,3 @@ def test_with_less_no_bolder_name(measured, part, effects):
         assert "inertia" in {*found.odds.labels}
     else:
         assert said(found) == "consistent "
-
-
-@pytest.mark.slow
-def test_inputs_are_left_alone_and_the_same_comes_twice(measured):
-    campaign = measured(INERTIA, SHARED)
-    tests = [vars(test) for test in (*campaign.sweeps, *campaign.loops)]
-    arrays = [array for test in tests for array in test.values() if isinstance(array, np.ndarray)]
-    copies = [array.copy() for array in arrays]
-    one, other = (json.dumps(diagnose(PreparedCampaign.from_campaign(campaign)).to_document()) for _ in range(2))
-    assert one == other
-    assert all(np.array_equal(array, copy) for array, copy in zip(arrays, copies, strict=True))

@@ -3,7 +3,6 @@
 import math
 from dataclasses import replace
 
-import mpmath
 import numpy as np
 import pytest
 import scipy.stats
@@ -11,7 +10,7 @@ import scipy.stats
 from bushfit.effects import BASE, LIBRARY, History, Layer, distributed_sliders, qualified_name, sliders
 from bushfit.effects.contract import RubberConditions
 from bushfit.effects.dead_zone import first_harmonic
-from bushfit.effects.friction import _strokes, harmonic_shape, mean_stress_decay, modulus
+from bushfit.effects.friction import _strokes, mean_stress_decay
 from bushfit.effects.temperature import log_shift
 from bushfit.geometry import Bushing, Direction, Specimen
 from bushfit.model.model import Model
@@ -67,22 +66,6 @@ def test_a_fixture_from_rest_rings_down_to_its_steady_state():
     extra = (model.force("axial", STARTED) - PLAIN.force("axial", STARTED))[last]
     steady = model.force("axial", tail) - PLAIN.force("axial", tail)
     assert np.max(np.abs(extra - steady)) < 1e-4 * np.max(np.abs(steady))
-
-
-def test_compliances_in_series_add():
-    both = added("sleeve_compliance.axial", added("sleeve_compliance", compliance=2e-8), factor=3e-8)
-    one = added("sleeve_compliance", compliance=5e-8)
-    np.testing.assert_array_equal(both.stiffness("axial", 20.0, 1e-4), one.stiffness("axial", 20.0, 1e-4))
-    forces = [model.force("axial", replace(LOOP, solved={})) for model in (both, one)]
-    np.testing.assert_allclose(*forces, rtol=1e-10)
-
-
-@pytest.mark.parametrize("alone", [PLAIN, added("clearance", delta=4e-5)], ids=["plain", "with play"])
-def test_a_rig_in_series_leaves_the_bushing_its_share_of_the_amplitude(alone):
-    """1/K = 1/K_b + c, where K_b is the bushing's stiffness at |1 - c K| of the amplitude."""
-    total = added("rig_compliance", alone, compliance=4e-7).stiffness(*AXIAL)
-    inside = alone.stiffness("axial", FREQUENCY, AMPLITUDE * np.abs(1.0 - 4e-7 * total))
-    np.testing.assert_allclose(total, inside / (1.0 + 4e-7 * inside), rtol=1e-6)
 
 
 @pytest.mark.parametrize("history", [LOOP, STARTED], ids=["steady", "from rest"])
@@ -209,35 +192,6 @@ def test_sliders_are_the_mean_of_very_many(strain):
     many = 5e5 * np.mean(jenkins_element(np.minimum(normal / strain, 1.0)))
     values = {"delta": 5e5, "e_s": 0.01, "spread": 0.9}
     np.testing.assert_allclose(distributed_sliders.modulus(values, omega, np.array([strain])), many, rtol=2e-4)
-
-
-def exact_shape(x: float) -> tuple[mpmath.mpf, mpmath.mpf]:
-    """(A, B)/(2 e0) with sigma_fmax = eps_half = 1, as model form."""
-    x = mpmath.mpf(x)
-    y = (mpmath.sqrt(x**2 + 6 * x + 1) - x - 1) / 2
-    s = c = 1 + y
-    big = 1 + c / x
-    in_phase = 2 * s * (c / x) * (big / mpmath.sqrt(big**2 - 1) - 1)
-    quadrature = 2 / mpmath.pi * (2 - s * (c / x) * mpmath.log((big + 1) / (big - 1)))
-    return in_phase / (2 * x), quadrature / (2 * x)
-
-
-def test_modulus_has_ten_digits_from_1e_8_to_1e6():
-    with mpmath.workdps(60):
-        for x, found in zip(X, harmonic_shape(X), strict=True):
-            for part, exact in zip((found.real, found.imag), exact_shape(x), strict=True):
-                assert abs(mpmath.mpf(float(part)) / exact - 1) <= 1e-10
-
-
-def test_limits_of_small_and_large_strain():
-    half = VALUES["sigma_fmax"] / (2.0 * VALUES["eps_half"])
-    omega = np.ones(1)
-    assert modulus(VALUES, omega, np.zeros(1))[0] == half + 0j
-    assert modulus(VALUES, omega, np.array([1e-12]))[0] == pytest.approx(half, rel=1e-9)
-    assert abs(modulus(VALUES, omega, np.array([1e6 * VALUES["eps_half"]]))[0]) < 1e-2 * half / 1e3
-    large = harmonic_shape(np.array([1e9, 1e6]))
-    assert large.imag[0] * 1e9 == pytest.approx(2.0 / np.pi, rel=1e-6)  # a square wave of height sigma_fmax
-    assert np.all(np.isfinite(large))
 
 
 @pytest.mark.parametrize("x", [1e-3, 0.3, 1.0, 20.0])

@@ -142,17 +142,6 @@ def test_the_prony_series_of_abaqus_and_of_the_table_is_the_model_within_the_sta
         assert rows["shear strain amplitude [%]"].iloc[0] == pytest.approx(100.0 * strain, rel=1e-6)
 
 
-def test_without_friction_a_prony_series_reaches_the_accuracy_and_has_no_amplitude(export_request, paper_model):
-    model = paper_model.without("friction")
-    grid = predict(Result(model), Direction.AXIAL, [5.0, 155.0], [1e-4, 5e-4])
-    request = replace(export_request, result=Result(model), predictions=(grid,), accuracy=0.002)
-    small, large = prony.prony_series(request)
-    assert small.arms.error == large.arms.error < 0.002
-    np.testing.assert_array_equal(small.relative_moduli, large.relative_moduli)
-    with pytest.raises(ModelError, match="a long-term modulus"):
-        prony.export(replace(request, result=Result(model.without("elastic"))))
-
-
 @pytest.mark.parametrize("name", ["nastran", "optistruct", "abaqus"])
 def test_stated_constants_are_the_rotations_without_a_law(name, export_request, tmp_path):
     stated = replace(export_request, cardanic=60.0 + 6.0j)
@@ -163,17 +152,6 @@ def test_stated_constants_are_the_rotations_without_a_law(name, export_request, 
             np.testing.assert_allclose(found[dof, rank][1], 1e3 * (60.0 + 6.0j), rtol=DIGITS)
     assert "rotations about x and y: the stated constant, 60 N m/rad, loss factor 0.1" in " ".join(exported.omissions)
     assert "no stiffness in" not in " ".join(exported.omissions)
-
-
-def test_stated_constants_in_adams(export_request):
-    files = adams.export(replace(export_request, cardanic=60.0 + 6.0j)).files
-    viscous = 6.0 * 1e3 * np.radians(1.0) / (2.0 * np.pi * 75.0)
-    for kind, damping in (("car", viscous), ("ride", np.degrees(np.arctan(0.1)))):
-        blocks = teimorbit(files[f"bushing_{kind}.bus"].decode("ascii"))
-        for end in ("TX", "TY"):
-            turned, moment = blocks[f"{end}_CURVE"][2].T
-            np.testing.assert_allclose(moment, 60e3 * np.radians(turned), rtol=DIGITS)
-            assert float(blocks["DAMPING"][0][f"{end}_DAMPING"]) == pytest.approx(damping, rel=DIGITS)
 
 
 def test_adams_holds_curve_and_damping(export_request, known):
@@ -264,16 +242,6 @@ def test_the_curve_of_adams_is_the_law_to_half_a_percent(paper_model, export_req
     fine = np.linspace(moved[0], moved[-1], 776)
     error = Akima1DInterpolator(moved, force)(fine) / (scale * law(per_displacement * fine)) - 1.0
     assert np.abs(error).max() < 0.005
-
-
-def test_the_rate_of_adams_is_the_stated_one(export_request):
-    slow, fast = (
-        teimorbit(adams.export(replace(export_request, static_rates=rates)).files["bushing_car.bus"].decode("ascii"))
-        for rates in (None, {"m": 10.0 / 60.0})
-    )
-    ratio = {end: fast[f"{end}_CURVE"][2][-1, 1] / slow[f"{end}_CURVE"][2][-1, 1] for end in ("FZ", "TZ")}
-    assert 1.05 < ratio["FZ"] < 1.4
-    assert ratio["TZ"] == 1.0
 
 
 @pytest.mark.parametrize("export", WRITERS)

@@ -2,8 +2,6 @@
 
 import importlib.util
 import io
-import re
-import sys
 import zipfile
 from dataclasses import replace
 from xml.etree import ElementTree as ET
@@ -170,42 +168,11 @@ def test_another_shape_is_set_by_its_two_numbers(paper, paper_model):
     assert worst(paper, model, "random", values=values) < LARGEST
 
 
-#: The functions of FMI 2.0 that a slave has to export (version 2.0.4, sections 2.1 and 4.2).
-FUNCTIONS = {
-    f"fmi2{name}{kind}"
-    for names, kinds in (
-        (("Get", "Set"), ("Real", "Integer", "Boolean", "String", "FMUstate")),
-        (("Get",), ("TypesPlatform", "Version", "Status", "RealStatus", "IntegerStatus", "BooleanStatus")),
-        (("Get",), ("StringStatus", "DirectionalDerivative", "RealOutputDerivatives")),
-        (("Instantiate", "Terminate", "Reset", "SetupExperiment", "SetDebugLogging", "DoStep", "CancelStep"), ("",)),
-        (("Enter", "Exit"), ("InitializationMode",)),
-        (("Free",), ("Instance", "FMUstate")),
-        (("SerializeFMUstate", "DeSerializeFMUstate", "SerializedFMUstateSize", "SetRealInputDerivatives"), ("",)),
-    )
-    for name in names
-    for kind in kinds
-}
-
-
 def archive(exported: Exported) -> dict[str, bytes]:
     """What the one file of an export holds."""
     ((_, content),) = exported.files.items()
     with zipfile.ZipFile(io.BytesIO(content)) as opened:
         return {name: opened.read(name) for name in opened.namelist()}
-
-
-def test_the_library_exports_the_interface_and_needs_no_other(exported):
-    """Names that a stripped library exports and needs are texts in it."""
-    content = archive(exported)
-    ((path, library),) = [(path, data) for path, data in content.items() if path.startswith("binaries/")]
-    assert path.split("/")[1] == {"linux": "linux64", "win32": "win64", "darwin": "darwin64"}[sys.platform]
-    assert [name for name in FUNCTIONS if f"{name}\0".encode() not in library] == []
-    assert b"\0directions\0" not in library, "only the interface is visible"
-    needed = {text.decode() for text in re.findall(rb"[\w./-]+\.(?:so|dll|dylib)\b", library, re.IGNORECASE)}
-    assert [name for name in needed if "bushfit" not in name and "libSystem" not in name] == []
-    listed = {file.get("name") for file in ET.fromstring(content["modelDescription.xml"]).iter("File")}
-    assert listed == {"fmu.c", "bushing.c", "model.c"}
-    assert {f"sources/{name}" for name in (*listed, "bushing.h", "fmi2.h", "model.h")} <= set(content)
 
 
 def test_the_same_model_gives_the_same_bytes_and_another_its_own_guid(paper_model):

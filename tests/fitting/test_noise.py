@@ -132,23 +132,6 @@ def test_whitening_is_exact_from_the_first_row_on():
     np.testing.assert_allclose(np.diag(covariance, 3), covariance[0, 3], atol=1e-6)
 
 
-def test_an_error_of_the_filter_moves_estimates_by_the_derivative_of_the_covariance():
-    """Whitened, L dV L^T of V = (L^T L)^-1, by differences of each coefficient over the first."""
-    count, first, step = 40, 1.3, 1e-6
-    noise = RowNoise(first * np.array([1.0, -0.6, 0.2]), error=np.eye(3))
-
-    def whitening(values: np.ndarray) -> np.ndarray:
-        return np.asarray(sum(value * np.eye(count, k=-k) for k, value in enumerate(values)))
-
-    size, *moves = noise.noise_sensitivity(np.eye(count))
-    np.testing.assert_array_equal(size, np.eye(count))
-    white = whitening(noise.filter)
-    for k, move in enumerate(moves, start=1):
-        ends = [whitening(noise.filter + sign * step * first * (np.arange(3) == k)) for sign in (-1.0, 1.0)]
-        low, high = (np.linalg.inv(end.T @ end) for end in ends)
-        np.testing.assert_allclose(move, white @ (high - low) @ white.T / (2.0 * step), atol=1e-6)
-
-
 def test_rows_of_other_cycles_are_whitened_anew():
     """Means over other cycles tell nothing of one another: between them the correlation is none."""
     from scipy.linalg import block_diag, toeplitz

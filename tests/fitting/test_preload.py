@@ -20,7 +20,6 @@ from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import FitSettings
 from bushfit.commands.compare import compare
 from bushfit.commands.predict import predict as predict_files
-from bushfit.diagnosis.workflow import diagnose
 from bushfit.errors import ModelError
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.procedures import fit_joint
@@ -29,7 +28,7 @@ from bushfit.model.file import from_document, to_document
 from bushfit.prediction.static_curve import static_curve
 from bushfit.prediction.stiffness import predict
 from bushfit.reading.measurement import Sweep
-from bushfit.reading.preload import Preload, distinct_preloads, parse_preload
+from bushfit.reading.preload import Preload, distinct_preloads
 from bushfit.report.tables import static_table
 
 BUSHING = Bushing("arm", 10e-3, 18e-3, 34e-3)
@@ -172,16 +171,6 @@ def test_two_preloads_that_differ_in_sense_give_a_line_and_one_is_a_label():
     assert any("axial: 2 preloads, -1 to 1 mm: the model follows a straight line" in line for line in result.warnings)
 
 
-def test_the_course_of_friction_between_two_preloads_is_open_and_one_preload_is_a_label():
-    result = joint_fit(campaign(STIFF, newtons(0.0, 800.0), seed=1))
-    alternative = result.alternatives[0].model.values
-    assert alternative["preload.friction"] > 0.0 == alternative["preload.friction_square"]
-    single = joint_fit(campaign(STIFF, newtons(800.0), seed=1))
-    assert "preload" not in single.model.effects
-    assert single.measured
-    assert single.measured.preloads == ()
-
-
 def test_a_preload_without_influence_is_a_sentence_and_can_be_predicted():
     data = PreparedCampaign.from_campaign(campaign(Rubber(), newtons(0.0, 500.0, 1000.0), seed=2))
     result = fit_joint(data)
@@ -230,30 +219,6 @@ def test_static_curves_and_comparisons_are_about_a_preload():
     assert "axial at a preload of 700 N: stiffness" in compared.words[0]
     with pytest.raises(ModelError, match="outside the tested range"):
         compare(result, result, preload="1100 N")
-
-
-def test_a_diagnosis_takes_stated_preloads_as_known():
-    data = PreparedCampaign.from_campaign(campaign(STIFF, newtons(0.0, 500.0, 1000.0), seed=4))
-    diagnosis = diagnose(data)
-    assert "preload" in diagnosis.result.model.effects
-    assert not diagnosis.added
-
-
-@pytest.mark.parametrize(
-    ("text", "preload"),
-    [
-        ("500 N", Preload(500.0, "N")),
-        ("-1.5 mm axial", Preload(-1.5e-3, "m")),
-        ("2 kN Axial", Preload(2000.0, "N")),
-        ("none", Preload(0.0, "N")),
-        ("500 N radial", None),
-        ("5 N m", None),
-        ("clamped", None),
-        (None, None),
-    ],
-)
-def test_preloads_are_read_from_texts(text, preload):
-    assert parse_preload(text, Direction.AXIAL) == preload
 
 
 def test_equal_preloads_are_one_and_mixed_quantities_are_none():

@@ -6,9 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bushfit.campaign.schema import FitSettings, RigSettings
+from bushfit.campaign.schema import RigSettings
 from bushfit.effects.contract import Array
-from bushfit.errors import FitError
 from bushfit.fitting.loop_cycles import steady_cycles
 from bushfit.fitting.loop_harmonics import MOST_ROWS
 from bushfit.fitting.noise import SweepNoise
@@ -108,15 +107,6 @@ def test_the_jacobian_is_that_of_the_residual(rig, sweep, paper_model, kind):
         np.testing.assert_allclose(found, expected, atol=2e-6 * np.abs(expected).max())  # one-sided differences
 
 
-def test_magnitude_and_loss_factor_are_what_they_say(sweep, paper_model):
-    stiffer = paper_model.with_values({"mu": 1.2e6})
-    found, measured = sweep.stiffness(stiffer), sweep.measured
-    deviation = replace(sweep, residuals="magnitude_loss_factor").deviation(sweep.stiffness(stiffer))
-    np.testing.assert_allclose(deviation.real, np.abs(found) / np.abs(measured) - 1.0, atol=1e-12)
-    loss = found.imag / found.real - measured.imag / measured.real
-    np.testing.assert_allclose(deviation.imag, loss * (measured.real / np.abs(measured)) ** 2, atol=1e-12)
-
-
 def test_the_right_model_of_a_loop_leaves_noise_alone(loop, paper_model):
     residual, counted = loop.residual(paper_model), loop.prepared.weight > 0.0
     assert residual.size == loop.size == loop.test.time.size
@@ -154,15 +144,6 @@ def test_repeats_of_a_loop_share_the_error_of_its_gain(campaign):
         replace(campaign, loops=(loop, *again, faster), rig=RigSettings(gain_error=5e-3))
     ).loops
     np.testing.assert_allclose([each.gain_error for each in found], [1e-2] * 4 + [5e-3])
-
-
-def test_dynamic_amplitudes_choose_the_levels(measured):
-    assert set(measured.smallest_sweep.amplitude) == {1e-4}
-    other = replace(measured.campaign, fit=FitSettings(dynamic_amplitudes=(2e-4, 5e-4)))
-    assert set(PreparedCampaign.from_campaign(other).smallest_sweep.amplitude) == {2e-4, 5e-4}
-    absent = PreparedCampaign.from_campaign(replace(measured.campaign, fit=FitSettings(dynamic_amplitudes=(3e-4,))))
-    with pytest.raises(FitError, match="no sweep at these amplitudes"):
-        _ = absent.smallest_sweep
 
 
 def measured(
@@ -227,34 +208,6 @@ def test_the_motion_is_cleared_and_the_true_model_leaves_only_noise(paper_model,
     assert (cycle.max(), -cycle.min()) == pytest.approx((AMPLITUDE, AMPLITUDE), rel=1.5e-2)
     assert data_set.relative_noise == pytest.approx(3e-3, rel=0.35)
     assert reduced < 1.0 + 6.0 * np.sqrt(2.0 / residual.size) + 0.1
-
-
-@pytest.mark.parametrize(
-    ("cycles", "amplitude", "preload"),
-    [(1, 1e-4, 640.0), (1, 1e-3, 640.0), (4, 1e-3, 640.0), (3.5, 1e-4, 640.0), (3, 1e-3, 0.0)],
-)
-def test_from_rest_which_may_be_a_preload_the_virgin_curve_is_followed(paper_model, cycles, amplitude, preload):
-    whole = rig.simulate_cycles(paper_model, Direction.AXIAL, FREQUENCY, amplitude, cycles=4, steps_per_cycle=1000)
-    rows = slice(round(1000 * cycles) + 1)
-    noise = 3e-3 * np.ptp(whole.force) / 2.0 * np.random.default_rng(0).standard_normal(whole.force.size)
-    force, settled = whole.force + preload + noise, slice(2000, None)
-    force[400] += 0.2 * np.ptp(whole.force)
-    motion = whole.displacement + 1.2e-3 * (preload > 0.0)
-    loop = Loop("loop", Direction.AXIAL, whole.time[rows], motion[rows], force[rows])
-    data_set = MeasuredLoop(prepare_loop(loop))
-    residual = MeasuredLoop(prepare_loop(loop, without_outliers=True)).residual(paper_model)
-    reduced = float(residual @ residual) / data_set.residual_count
-    assert data_set.prepared.from_rest
-    assert data_set.outlier_indices(paper_model).tolist() == [400]
-    if cycles >= 2:
-        assert data_set.relative_noise == pytest.approx(3e-3, rel=0.1)
-        assert 0.8 < reduced < 1.2
-    else:  # the noise of a single cycle from rest cannot be separated from its start
-        assert reduced < 1.2
-    assert not data_set.prepared.history(is_transient=False).periodic
-    assert ("recorded about a mean displacement of 1.2 mm" in " ".join(data_set.notes)) == (preload > 0.0)
-    later = Loop("loop", Direction.AXIAL, whole.time[settled], motion[settled], force[settled])
-    assert not prepare_loop(later).from_rest
 
 
 def test_many_rows_are_binned_without_loss(paper_model):

@@ -11,7 +11,6 @@ from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import ParameterSetting, RigSettings
 from bushfit.errors import BushfitError
 from bushfit.fitting.assess import covariance
-from bushfit.fitting.model_error import log_likelihood
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.problem import FitProblem
 from bushfit.fitting.solve import solve_with_lmfit
@@ -82,11 +81,6 @@ def test_tests_contradict_a_wrong_prior_and_no_right_one(rig, paper_model):
         assert any("the tests contradict the prior of alpha" in line for line in found.warnings) == contradicts
 
 
-def test_a_prior_of_a_parameter_that_the_model_lacks_is_reported(rig):
-    found = _fitted(rig(0), **{"inertia.mass": ParameterSetting(prior="0.1 kg +- 0.01 kg")})
-    assert "the prior 0.1 kg +- 0.01 kg is not used: the model lacks inertia.mass" in found.warnings
-
-
 @pytest.mark.parametrize(
     ("setting", "message"),
     [
@@ -113,15 +107,3 @@ def test_what_is_no_tie_or_prior_is_one_clear_error(rig, setting, message):
     with pytest.raises(BushfitError) as error:
         _fitted(rig(0), alpha=ParameterSetting(**setting))
     assert message in str(error.value)
-
-
-def test_the_likelihood_of_a_fit_has_the_density_of_its_prior(rig, paper_model):
-    """A prior around the estimate multiplies it by its density there, averaged over the errors of the tests."""
-    tests = PreparedCampaign.from_campaign(rig(5)).data_sets
-    plain = solve(FitProblem(paper_model, tests, FIVE))
-    prior = Prior(("alpha",), np.array([plain.model.values["alpha"]]), np.array([[0.01**2]]), "")
-    known = solve(FitProblem(replace(plain.model, constraints=Constraints([prior])), tests, FIVE))
-    i, size = FIVE.index("alpha"), float(plain.coordinates.slopes(plain.model.values)[FIVE.index("alpha")])
-    variance = np.linalg.inv(plain.jacobian @ plain.jacobian.T)[i, i] + (0.01 / size) ** 2
-    gain = log_likelihood(known, {}) - log_likelihood(plain, {})
-    assert gain == pytest.approx(-0.5 * np.log(variance), abs=0.01)

@@ -92,14 +92,6 @@ def test_radial_sweep_follows_from_axial_tests(measured, result):
     assert loss < 0.01
 
 
-def test_passes_agree_and_settle_where_plain_passes_would(measured):
-    found = fit_two_step(measured)
-    before, last = found.passes[-2], found.passes[-1]
-    assert all(abs(last[name] / before[name] - 1.0) < 1e-4 for name in FIVE)
-    static = fit_static(measured, found.result)
-    assert np.max(np.abs(errors(fit_dynamic(measured, static), found.result.model.values))) < 1e-3
-
-
 def test_errors_of_held_parameters_are_carried_over(measured, result):
     carried, sharp = fit_dynamic(measured, result), fit_dynamic(measured, Result(result.model))
     for name, most in (("m", 0.02), ("alpha", 0.01)):

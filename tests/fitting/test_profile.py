@@ -97,23 +97,6 @@ def test_what_rests_on_a_bound_is_told_by_how_far_from_it_the_tests_let_it_be(ri
     assert "(95 %)" in told
 
 
-def test_one_loop_bounds_mu_from_above_alone(rig, paper_model):
-    """The storage of one loop is mu + m/2 omega^alpha cos(pi alpha/2): all may be mu's, and all the springpot's."""
-    result = joint_fit(rig(3, **plan(1e-3, sweeps=())), profile=True)
-    values, omega = paper_model.values, 2.0 * np.pi * 0.1
-    turn = np.pi * values["alpha"] / 2.0
-    springpot = values["m"] / 2.0 * omega ** values["alpha"]
-    low, high = result.profile["mu"]
-    assert low is None
-    assert high == pytest.approx(values["mu"] + springpot * np.cos(turn), rel=0.01)
-    low, high = result.profile["m"]
-    damper = 2.0 * springpot * np.sin(turn) / omega
-    assert 0.7 * damper < low < damper
-    assert high is None
-    assert result.profile["alpha"] == (None, None)
-    assert max(abs(value) for _, _, value in result.covariance.correlations()) <= 1.0 + 1e-9
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("shared", [False, True], ids=["independent", "shared"])
 def test_profiles_hold_the_truth_as_often_as_they_say(rig, paper_model, shared):

@@ -8,7 +8,6 @@ follow another law are told apart from it, a test here says.
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -18,7 +17,6 @@ from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import FitSettings
 from bushfit.campaign.simulated import SimulatedLoop, SimulatedSweep, SimulateSettings
 from bushfit.commands.fit import campaign_files, fit
-from bushfit.commands.predict import predict as predict_campaign
 from bushfit.diagnosis.workflow import diagnose
 from bushfit.effects import BASE
 from bushfit.errors import ModelError
@@ -162,20 +160,3 @@ def test_a_sweep_off_the_law_says_so(truth):
     off = np.array([(each.best_shift[0] - each.shift[0]) / each.best_shift[1] for each in found])
     assert abs(off[1]) > 4.0 * max(abs(off[0]), abs(off[-1]))
     assert off[1] < -4.0
-
-
-def test_only_tests_of_its_temperature_stand_beside_a_prediction(clean):
-    """At 38 degC one of five sweeps; all of them tell how well the model meets them."""
-    campaign = measure(clean, PLAN).campaign()
-    result = joint_fit(campaign, effects=(*BASE, "temperature"))
-    grid: dict[str, Any] = {"directions": ("axial",), "frequencies": BAND, "amplitudes": (5e-4,)}
-    at_38, at_30 = (predict_campaign(result, campaign, **grid, temperature=CELSIUS + at) for at in (38.0, 30.0))
-    assert len(at_38.measured) == len(SWEEPS)
-    measured, none = (found.predictions[0].measured for found in (at_38, at_30))
-    np.testing.assert_allclose(np.abs(measured), at_38.predictions[0].stiffness.value, rtol=0.03)
-    assert np.isnan(none).all()
-    assert result.measured.temperature == pytest.approx((CELSIUS - 10.0, CELSIUS + 53.0))
-    for degrees, told in ((53.0, 0), (80.0, 1), (-30.0, 1)):
-        lines = predict(result, Direction.AXIAL, [30.0], [2e-4], temperature=CELSIUS + degrees).warnings
-        words = f"predicted at {degrees:g} degC, but fitted at -10 to 53 degC only"
-        assert [words in line for line in lines if "degC" in line] == [True] * told

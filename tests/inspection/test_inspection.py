@@ -135,13 +135,6 @@ def test_each_fault_of_a_loop_is_told(loop, tmp_path, said):
     assert len(odd) <= 2
 
 
-@pytest.mark.parametrize(("offset", "unit"), [(1.5e-3, "mm"), (0.1253, "N")])
-def test_a_position_far_from_that_of_the_mean_force_is_no_preload(loop, tmp_path, offset, unit):
-    """A gauge counts from a zero of its own; a preload compresses by about what the loop's stiffness says."""
-    seen = look(tmp_path, replace(loop, displacement=loop.displacement + offset, force=loop.force + 820.0))
-    assert seen.entry["preload"].endswith(f" {unit}")
-
-
 def test_gaps_and_an_uneven_clock_are_described(loop, tmp_path):
     uneven = less(loop, slice(5, None, 10))
     assert look(tmp_path, uneven).facts["sampling"].startswith("uneven, every 0.01 to 0.02 s, mostly 0.01 s")
@@ -303,20 +296,6 @@ def test_clean_tests_raise_nothing(clean, tmp_path, rig, seeds):
             seen.append(inspect_file(file, {"frequency": frequency, "waveform": waveform}))
         raised += [f"seed {seed}, {one.file.name}: {sentence}" for one in seen for sentence in one.odd]
     assert raised == []
-
-
-def test_gaps_in_a_motion_are_told_and_slow_loops_are_no_stepped_sine(loop, tmp_path, paper_model):
-    table = raw_loop_table(loop).iloc[:, 1:].drop(index=range(500, 530))
-    table.to_csv(tmp_path / "axial.csv", index=False)
-    odd = inspect_file(tmp_path / "axial.csv", {"frequency": "0.1 Hz", "waveform": "sine"}).odd
-    assert any(
-        "1 gap in the motion, the first after data row 500: the displacement jumps from " in line for line in odd
-    )
-    planned = SimulatedLoop(Direction.AXIAL, 5e-4, cycles=4, frequencies=(0.1, 0.3))
-    (record,) = simulate(paper_model, SimulateSettings(loops=(planned,))).loops
-    seen = look(tmp_path, record)
-    assert seen.kind == "loop"
-    assert seen.facts["programme"].startswith("2 loops in one record: 0.5 mm at 0.1, 0.3 Hz")
 
 
 def test_the_data_of_the_repository_raise_only_what_is_there(root):

@@ -10,8 +10,6 @@ from bushfit.campaign.campaign import load_campaign, model_of
 from bushfit.campaign.quantities import Compound
 from bushfit.campaign.schema import RigSettings
 from bushfit.campaign.simulated import SimulatedLoop, SimulatedSweep
-from bushfit.commands.plan import plan as plan_tests
-from bushfit.effects import get_effect
 from bushfit.effects.contract import Array
 from bushfit.fitting.preparation import MeasuredSweep, planned_loop, planned_sweep
 from bushfit.fitting.problem import FitProblem
@@ -108,18 +106,6 @@ def test_the_gain_of_a_loop_is_no_surer_than_the_class_of_the_rig(known):
     np.testing.assert_allclose(told, slopes @ slopes.T, rtol=0.02, atol=1e-3 * np.max(np.abs(told)))
 
 
-def test_an_effect_shows_as_a_fit_without_it_misses_it(known):
-    """Noncentrality against chi-square of the best fit of the model to noise-free tests with a little of the effect."""
-    counts = np.array([2, 1, 1, 1, 2, 0, 0])
-    view = view_of(replace(known, noise=replace(NOISE, level=(0.0, 0.0)), covariance=1e8 * np.eye(5)), TESTS)
-    expected = view.total(counts).noncentralities()[0, 0]
-    truth = known.model.with_effect("delay", {"delay.tau": 2e-6})
-    each = np.repeat(np.arange(5), counts[:5])
-    sweeps = [_noise_free(known.model, truth, SWEEPS[i]) for i in each]
-    found = solve(FitProblem(known.model, sweeps, known.names)).chi_square
-    assert found == pytest.approx(expected * (2e-6 / get_effect("delay").amount.typical) ** 2, rel=0.02)
-
-
 def _noise_free(model: Model, truth: Model, test: SimulatedSweep) -> MeasuredSweep:
     """One run of a sweep, as the truth has it."""
     sweep = planned_sweep(model, test.direction, *operating_points(test), NOISE.scatter, NOISE.shared)
@@ -212,16 +198,6 @@ def test_no_test_is_beyond_the_rig(known, limit, most):
         assert reached[limit].max() <= most * (1 + 1e-6)
     assert {type(test) for test in found} == {SimulatedLoop, SimulatedSweep}
     assert {*found} != {*candidates(known, wanted("predictions", 4.0))}
-
-
-def test_a_rig_without_limits_and_an_error_of_the_model_are_told(root):
-    """What no test lowers is part of the errors promised."""
-    found = plan_tests(load_campaign(root / "data/practice/case_001/bushing.toml"), hours=1.0)
-    limits, model, *_ = found.document["warnings"]
-    assert limits.startswith("[rig] states no limits: the plan reaches ")
-    assert "m/s" in limits
-    assert model.startswith("the errors of the stiffness include the model error, up to ")
-    assert all(row["planned"] > 0.01 for row in found.document["stiffness"].values())
 
 
 def test_simulated_campaigns_show_the_errors_promised(known):

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from fits import joint_fit
-from scipy.stats import binom, false_discovery_control, norm
+from scipy.stats import binom
 from scipy.stats import f as fisher
 from scipy.stats import t as student
 
@@ -13,14 +13,13 @@ from bushfit.campaign.simulated import SimulatedLoop, SimulatedSweep, SimulateSe
 from bushfit.commands.compare import compare as compare_results
 from bushfit.commands.compare import compared_result
 from bushfit.effects.contract import Array
-from bushfit.effects.unnamed import Patch, Unnamed
 from bushfit.geometry import Bushing, Direction
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import FIVE, Model
 from bushfit.model.result import Range, Result
 from bushfit.prediction.bands import Band
 from bushfit.prediction.comparison import Comparison, compare, with_holm
-from bushfit.prediction.parameter_comparison import ParameterContrast, holm
+from bushfit.prediction.parameter_comparison import ParameterContrast
 from bushfit.simulation.measured import measure
 from bushfit.simulation.undisturbed import Undisturbed, undisturbed
 
@@ -132,15 +131,6 @@ def test_the_headline_joins_two_tests(paper_model, deviation, joint, named):
     assert replace(found, contrasts=(replace(unknown, loss_factor=unknown.stiffness),), joint=None).differing == []
 
 
-@pytest.mark.parametrize(("length", "independent"), [(1e-3, 16), (1e3, 2)])
-def test_errors_of_the_model_are_as_many_as_their_length_permits(paper_model, length, independent):
-    """Real and imaginary part at each of eight points if the length is short; if it is long, one each."""
-    patch = Patch(("axial",), (10.0,), (0.01,), (0.05,), (0.05,), (0.01,), (0.01,))
-    result = Result(paper_model, model_error=Unnamed(0.05, (length, length), (patch,)))
-    widening = norm.ppf(0.5 * (1.0 + 0.95 ** (1.0 / independent))) / norm.ppf(0.975)
-    assert against(result, result).widening == pytest.approx(widening, rel=0.015)
-
-
 @pytest.mark.parametrize("freedom", [1e6, 12.0])
 def test_figures_are_those_of_independent_normal_errors(paper_model, freedom):
     """Against scipy: t of each parameter with the degrees of freedom of Welch, and Hotelling's T^2 of all together."""
@@ -185,21 +175,6 @@ def test_m_is_compared_at_a_frequency_where_alpha_is_free_and_alone_where_it_is_
     assert list(found) == list(FIVE)
     assert found["m"].p == pytest.approx(1.0)
     assert found["alpha"].note == "fixed in both"
-
-
-def test_holm_is_holm():
-    """His example of four tests, by hand; more than Benjamini and Hochberg's."""
-    p = [0.01, 0.04, 0.03, 0.005]
-    assert holm(p) == pytest.approx([0.03, 0.06, 0.06, 0.02])
-    assert (np.array(holm(p)) >= false_discovery_control(p)).all()
-    assert holm([]) == []
-
-
-def test_uneven_bands_are_subtracted_end_from_opposite_end():
-    one, two = (Band(*map(np.array, ends)) for ends in ((2.0, 1.9, 2.3), (1.0, 0.7, 1.1)))
-    difference = one.minus(two)
-    ends = difference.value, difference.low, difference.high
-    assert ends == pytest.approx((1.0, 1.0 - np.hypot(0.1, 0.1), 1.0 + np.hypot(0.3, 0.3)))
 
 
 def mu_alone(model: Model, frequency: tuple[float, float], displacement: tuple[float, float]) -> Result:

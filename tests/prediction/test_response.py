@@ -9,7 +9,6 @@ from scipy.signal import chirp
 from bushfit.commands.respond import respond
 from bushfit.effects.contract import Array
 from bushfit.effects.history import History
-from bushfit.effects.rig_compliance import force as sleeve_force
 from bushfit.effects.unnamed import Patch, Unnamed
 from bushfit.errors import MeasurementError
 from bushfit.geometry import Direction
@@ -186,23 +185,6 @@ def test_a_low_pass_removes_the_noise_that_friction_would_follow(paper_model, no
     assert 20.0 < highest < 45.0
 
 
-@pytest.mark.parametrize("compliance", [1e-7, 1e-6])
-def test_a_soft_sleeve_in_a_long_history_is_soon_in_equilibrium(paper_model, compliance):
-    """Friction that a pulse leaves loaded once passed for a stiffness, and twice the forces were needed."""
-    history, motions = History.sampled(np.tile(random(TIME), 30), STEP), list[Array]()
-
-    def bushing(history: History) -> Array:
-        motions.append(history.value)
-        return paper_model.force("axial", history)
-
-    force = sleeve_force({"compliance": compliance}, bushing, history, paper_model.setting("axial"))
-    inner = bushing(history.with_value(history.value - compliance * force))
-    np.testing.assert_allclose(force, inner, atol=1e-5 * inner.max())
-    assert np.ptp(compliance * force) > 0.04 * np.ptp(history.value)
-    print(len(motions), "forces of the bushing")
-    assert len(motions) < 9
-
-
 def test_what_has_no_law_for_the_motion_is_named(paper_model):
     model = paper_model.with_effect("mullins_softening", {"mullins_softening.share": 0.1})
     model = model.with_effect("rate_dependent_friction", {"rate_dependent_friction.n": 0.05})
@@ -216,12 +198,3 @@ def test_what_has_no_law_for_the_motion_is_named(paper_model):
         "axial: mullins_softening left out, because no law describes this motion",
         "axial: rate_dependent_friction constant, as in a sine of 10 Hz and 0.1 mm",
     )
-
-
-def test_sliders_in_blocks_are_sliders_at_once(paper_model, monkeypatch):
-    model = paper_model.with_effect("distributed_sliders")
-    history = History.sampled(random(TIME), STEP)
-    expected = model.force("axial", history)
-    monkeypatch.setattr("bushfit.effects.sliders._BLOCK", 1000)
-    both = replace(history, value=np.stack([history.value, history.value[::-1]]))
-    np.testing.assert_allclose(model.force("axial", both)[0], expected, rtol=1e-12, atol=1e-9)

@@ -10,7 +10,7 @@ from bushfit.errors import ModelError
 from bushfit.geometry import Direction
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
-from bushfit.model.result import Alternative, CampaignTable, Range, Result, TestTable
+from bushfit.model.result import CampaignTable, Range, Result, TestTable
 from bushfit.prediction.static_curve import static_curve, static_rate
 from bushfit.prediction.stiffness import predict
 from bushfit.prediction.superposed import LargeMotion
@@ -112,14 +112,6 @@ def test_the_rate_is_stated_or_that_of_the_slowest_loop(paper_model):
     assert static_rate(tested, Direction.AXIAL, {"rad": 1e-5}) == pytest.approx(4e-4)
 
 
-def test_a_law_of_the_harmonic_alone_has_no_curve_unless_it_is_the_rigs(paper_model):
-    with pytest.raises(ModelError, match="hysteretic_loss: an effect of the model has no law in time"):
-        static_curve(Result(paper_model.with_effect("hysteretic_loss")), Direction.AXIAL, 1e-3, RATE)
-    rigged = paper_model.with_effect("rig_compliance", {"rig_compliance.compliance": 1e-7})
-    kept, plain = (static_curve(Result(model), Direction.AXIAL, 1e-3, RATE) for model in (rigged, paper_model))
-    np.testing.assert_array_equal(kept.mean.value, plain.mean.value)
-
-
 def test_a_smooth_correction_changes_the_curve_as_in_a_sine(paper_model):
     node = (RATE / 4e-3,), (1e-3 * paper_model.unit_strain(Direction.AXIAL),)
     data = Unnamed(0.1, (1.0, 1.0), (Patch(("axial",), *node, (0.1,), (0.0,), (0.01,), (0.01,)),))
@@ -128,20 +120,6 @@ def test_a_smooth_correction_changes_the_curve_as_in_a_sine(paper_model):
     curve, plain = (static_curve(Result(model), Direction.AXIAL, 1e-3, RATE) for model in (corrected, paper_model))
     assert curve.secant.value == pytest.approx(1.1 * plain.secant.value, rel=1e-3)
     assert curve.secant.high - curve.secant.value == pytest.approx(1.96 * 0.01 * plain.secant.value, rel=0.05)
-
-
-def test_an_alternative_without_a_law_in_time_is_left_out_with_a_sentence(paper_model):
-    other = paper_model.with_values({"mu": 1.05 * paper_model.values["mu"]})
-    untimed = paper_model.without("friction").with_effect("kraus", {"kraus.delta": 1e6})
-    alternatives = tuple(Alternative(model, 0.1) for model in (other, untimed))
-    with_both, with_one = (
-        static_curve(Result(paper_model, alternatives=chosen), Direction.AXIAL, 1e-3, RATE)
-        for chosen in (alternatives, alternatives[:1])
-    )
-    sentence = "axial, static curve: the band excludes the alternative with kraus, which has no law in time"
-    assert (with_both.warnings, with_one.warnings) == ((sentence,), ())
-    np.testing.assert_array_equal(with_both.mean.high, with_one.mean.high)
-    assert with_one.mean.high[-1] > with_one.mean.value[-1]
 
 
 def on_the_rig(model: Model, motion: LargeMotion) -> complex:

@@ -121,14 +121,6 @@ def test_the_compound_is_carried_to_another_bushing(result):
     assert any("extrapolated" in line for line in predict(other, Direction.RADIAL, [10.0], [5e-3]).warnings)
 
 
-def test_a_model_given_by_hand_has_no_bands_and_says_so(paper_model):
-    prediction = predict(Result(paper_model), Direction.RADIAL, [5.0, 55.0], [1e-4])
-    assert np.array_equal(prediction.stiffness.low, prediction.stiffness.high)
-    assert prediction.warnings == ()
-    (said,) = caveats(Result(paper_model))
-    assert "no uncertainty" in said
-
-
 @pytest.mark.parametrize(
     ("direction", "fitted", "inner", "shape", "said"),
     [

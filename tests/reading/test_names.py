@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from bushfit import units
 from bushfit.geometry import Direction
 from bushfit.reading.layout import Line
-from bushfit.reading.names import Labels, direction_of_file, labels_above, labels_in_names, named_direction
+from bushfit.reading.names import Labels, direction_of_file, labels_above, labels_in_names
 
 
 def amplitudes(said: Labels, expected: str = "m") -> list[tuple[str, str | None]]:
@@ -33,18 +33,6 @@ def test_the_amplitude_in_a_name(name, text, convention):
     assert amplitudes(labels_in_names(name)) == [(text, convention)]
 
 
-def test_what_no_single_number_says_frequencies_strains_and_sheets():
-    names = ["CMP15961", "2024-05-03", "20240503_12", "test 7", "axial_05mm", "0.1-1mm", "A0.05", "v2mm", "D 20 mm", ""]
-    assert {name: amplitudes(labels_in_names(name)) for name in names} == {name: [] for name in names}
-    assert amplitudes(labels_in_names("axial_18mm_bushing_1mm")) == [("18 mm", None), ("1 mm", None)]
-    assert amplitudes(labels_in_names("DMA_10Hz_0,05%"), "1") == [("0.05 %", None)]
-    assert amplitudes(labels_in_names("x_50mHz"), "Hz") == [("50 mHz", None)]
-    assert amplitudes(labels_in_names("5-155Hz"), "Hz") == []
-    said = labels_in_names("radial 0.3mm", "axial 0.1mm 20Hz")
-    assert (said.direction, amplitudes(said)) == (Direction.RADIAL, [("0.3 mm", None)])
-    assert amplitudes(said, "Hz") == [("20 Hz", None)]
-
-
 @pytest.mark.parametrize(
     ("name", "keys"),
     [
@@ -66,18 +54,6 @@ def test_what_no_single_number_says_frequencies_strains_and_sheets():
 def test_what_else_a_name_says(name, keys):
     said = labels_in_names(name)
     assert {key: value for key, value in vars(said).items() if value and key != "quantities"} == keys
-
-
-@pytest.mark.parametrize(
-    ("name", "direction"),
-    [
-        ("sweep_axial_2", Direction.AXIAL), ("bague_axiale", Direction.AXIAL), ("Essais radiaux", Direction.RADIAL),
-        ("Verdrehung-3", Direction.TORSION), ("TORSIÓN", Direction.TORSION), ("axial_and_radial", None),
-        ("coaxial", None), ("loop", None),
-    ],
-)  # fmt: skip
-def test_one_word_of_four_languages_settles_the_direction(name, direction):
-    assert named_direction([name]) is direction
 
 
 def test_lines_above_a_table_and_the_name_before_the_headers():

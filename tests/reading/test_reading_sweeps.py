@@ -12,7 +12,7 @@ from texts import SWEEP, SWEEP_HEADER, SWEEP_ROWS, refused, sweep_from, with_lin
 
 from bushfit.geometry import Specimen
 from bushfit.reading.measurement import Sweep
-from bushfit.reading.runs import nominal, runs_of
+from bushfit.reading.runs import runs_of
 
 ONE_LEVEL = "\n".join(["frequency [Hz],stiffness [N/mm],loss factor [-]", *(f"{f},{500 + f},0.1" for f in (5, 15, 25))])
 ONE_FREQUENCY = "\n".join(
@@ -124,16 +124,6 @@ def test_the_rows_at_a_stated_temperature_are_taken_with_their_repeats(tmp_path)
     assert numbered.repeat.tolist() == [2, 2, 2, 3, 3, 3]
 
 
-@pytest.mark.parametrize(
-    ("unit", "value", "degrees"),
-    [(" [degC]", 22.0, 22.0), (" [°C]", 22.0, 22.0), (" [K]", 295.15, 22.0), (" [degF]", 71.6, 22.0),
-     (" [C]", 22.0, 22.0), ("", 22.0, None)],
-)  # fmt: skip
-def test_the_temperature_of_a_file_is_its_condition_if_it_has_a_unit(unit, value, degrees, tmp_path):
-    source = sweep_from(at_temperatures(value, value).replace(" [degC]", unit), tmp_path).source
-    assert source.conditions.get("temperature_degC") == (degrees and pytest.approx(degrees))
-
-
 #: What is wrong, what is stated, and what the error says besides what tests/cli/spoiled_tables.py has.
 BAD_SWEEPS: list[tuple[str, dict[str, Any], list[str]]] = [
     (ONE_FREQUENCY, {}, ["line 1", "no column for the frequency", 'at_frequency = "10 Hz"']),
@@ -192,22 +182,6 @@ def test_amplitude_sweeps_as_reached_have_their_levels_back(repeats, scatter, se
     assert np.allclose(runs.amplitude, meant, rtol=scatter + 1e-12)
 
 
-@pytest.mark.parametrize("order", ["by amplitude", "shuffled"])
-def test_repeats_in_any_order_have_their_levels_back(order):
-    """Levels that miss by less than 4 % at each frequency, and by more over all of them."""
-    frequency, reached, meant, _ = swept(AMPLITUDES, FREQUENCIES, 3, 0.035, 7)
-    reached = reached * np.where(frequency == 80.0, 0.95, 1.0)
-    rows = np.lexsort((reached, frequency))
-    rows = rows if order == "by amplitude" else np.random.default_rng(1).permutation(rows)
-    runs = runs_of(frequency[rows], reached[rows], None)
-    assert runs.stepped == "amplitude"
-    assert np.unique(runs.amplitude).size == AMPLITUDES.size
-    assert np.allclose(runs.amplitude, meant[rows], rtol=0.05)
-    assert np.bincount(runs.repeat).tolist() == [0, 45, 45, 45]
-    of_uneven = runs_of(frequency[rows][1:], reached[rows][1:], None)
-    assert np.array_equal(of_uneven.amplitude, reached[rows][1:])
-
-
 @given(st.permutations(["level", "repeat"]), st.booleans(), st.booleans(), st.floats(0.01, 1.0), st.integers(0, 10_000))
 def test_frequency_sweeps_as_reached_have_their_levels_and_repeats_back(outer, falling, numbered, share, seed):
     """Three levels in three repeats, in either order: what each run reached at one frequency it reached at no other.
@@ -235,15 +209,6 @@ def test_a_mass_on_a_mount_holds_neither_and_each_pass_is_a_run():
     assert runs.stepped is None
     assert np.array_equal(runs.repeat, np.repeat([1, 2], 50))
     assert np.array_equal(runs.amplitude, amplitude)
-
-
-def test_amplitudes_that_nothing_groups_are_their_own_levels_and_one_that_falls_short_is_one_run():
-    for amplitudes in (np.geomspace(1e-5, 1e-3, 40), [1e-4, 1.1e-4, 1.48e-4, 1.63e-4], [1e-4, 2e-4, 5e-4], [1e-4]):
-        assert np.array_equal(nominal(np.array(amplitudes)), amplitudes)
-    frequency = np.geomspace(0.01, 100.0, 28)
-    runs = runs_of(frequency, 0.15 * frequency**-0.03, None)
-    assert runs.stepped == "frequency"
-    assert np.unique(runs.amplitude).size == 1
 
 
 @pytest.mark.parametrize("stepped", ["frequency", "amplitude"])

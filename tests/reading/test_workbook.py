@@ -143,14 +143,6 @@ def test_spoiled_workbooks_have_one_clear_error(sheets, sheet, words, tmp_path):
         forces(workbook(sheets, tmp_path), sheet=sheet)
 
 
-@pytest.mark.parametrize("row", [["a", 1.0, 2.0], [True, 1.0, 2.0], [1e6, None, 2.0], ["Mittelwert", 3.0, 4.0]])
-def test_rows_of_a_sheet_without_data_are_left_out_and_listed(row, tmp_path):
-    file = workbook({"Loop": [*LOOP, row]}, tmp_path)
-    loop = read_loop(file, Direction.AXIAL, LoopFile(file=file.name))
-    assert np.array_equal(loop.force, FORCE)
-    assert "left out, without data: row 62" in loop.source.notes[0]
-
-
 @pytest.mark.parametrize("cells", [lambda row: f"=1*{row}", lambda row: float(row)], ids=["all", "one column"])
 def test_formulas_whose_values_were_not_saved_are_said(cells, tmp_path):
     """As programs write them that do not compute, openpyxl among them."""

@@ -171,19 +171,6 @@ def test_whatever_controller_and_logger_do(controller, logger):
     assert np.abs(column(reduction, "stiffness") / stiffness - 1.0).max() < 1e-3
 
 
-def test_overtones_of_both_channels_are_reported_and_do_no_harm():
-    phase = 2.0 * np.pi * 23.7 * np.arange(0.0, 1.513, 1.0 / 4000.0)
-    motion = 1e-3 * np.sin(phase) + 2e-5 * np.sin(2.0 * phase + 1.0)
-    force = 400.0 * np.sin(phase + 0.3)
-    for order, share in ((3, 0.05), (5, 0.02), (7, 0.01)):
-        force = force + 400.0 * share * np.sin(order * phase + order)
-    time = phase / (2.0 * np.pi * 23.7)
-    (step,) = reduce([Loop("x", Direction.AXIAL, time, motion, force)]).steps
-    assert step.stiffness == pytest.approx(4e5 * np.exp(0.3j), rel=1e-6)
-    assert step.displacement_distortion == pytest.approx(0.02, rel=1e-4)
-    assert step.force_distortion == pytest.approx(np.sqrt(0.05**2 + 0.02**2 + 0.01**2), rel=1e-4)
-
-
 def test_repeats_and_levels(paper_model):
     """Two repeats in one record, a third in another; the rig misses its set point by up to 3 %."""
     first = stepped(paper_model, [(10.0, 0.97e-4), (30.0, 1.03e-4), (10.0, 1.0e-4), (30.0, 1.01e-4)])
@@ -195,18 +182,6 @@ def test_repeats_and_levels(paper_model):
     assert np.unique(column(named, "level")).tolist() == [0.97e-4, 1.03e-4]
     with pytest.raises(MeasurementError, match=r"the stated levels[\s\S]*0.097 mm at 10 Hz[\s\S]*30 % of 0.2 mm"):
         reduce([first], levels=(2e-4,))
-
-
-def test_a_short_step_whose_motion_starts_and_stops_within_a_cycle_is_a_point():
-    """Of six cycles, the first and the last are 0.8 % larger."""
-    time = np.arange(0.0, 2.6, 1.0 / 1024.0)
-    turns = 5.0 * (time - 0.5)
-    envelope = np.clip(np.minimum(turns + 0.02, 8.02 - turns), 0.0, 1.0) * ((turns >= 0.0) & (turns <= 8.0))
-    motion = envelope * np.sin(2.0 * np.pi * turns)
-    noise = 2e-3 * np.random.default_rng(29).standard_normal(time.size)
-    reduction = reduce([Loop("x", Direction.AXIAL, time, 1e-4 * (motion + noise), 90.0 * motion)])
-    assert [step.nominal_frequency for step in reduction.steps] == [pytest.approx(5.0, rel=1e-3)]
-    assert abs(reduction.steps[0].stiffness) == pytest.approx(9e5, rel=1e-3)
 
 
 @pytest.mark.parametrize(

@@ -9,8 +9,8 @@ import pytest
 from kinds import SIZES, Bench, largest, sized
 from lab_campaign import KINDS, RUBBERS, OtherRubber, a_specimen, campaign
 from rubber_card import evaluate
-from rubber_in_time import StrainHistory, fractional_derivative, relax, sliders
-from time_rig import DIRECTIONS, Bushing, Rubber, Tests, first_harmonic, friction, respond
+from rubber_in_time import StrainHistory
+from time_rig import DIRECTIONS, Bushing, Rubber, Tests, friction, respond
 
 from bushfit import geometry
 from bushfit.effects import BASE
@@ -106,26 +106,6 @@ def test_friction_with_further_turns_is_that_walked_from_rest():
 
 def steady(frequency: float, amplitude: float = 1.0) -> StrainHistory:
     return StrainHistory(amplitude * np.sin(PHASE)[None, :], np.array([[1.0 / (512 * frequency)]]), periodic=True)
-
-
-def test_relaxation_is_that_of_a_maxwell_element():
-    history = steady(2.0)
-    stress = relax(history, history.rate, np.full_like(history.rate, 1.0 / 0.05))
-    z = 2j * np.pi * 2.0 * 0.05
-    assert first_harmonic(stress) / first_harmonic(history.strain) == pytest.approx(z / (1.0 + z), rel=1e-3)
-
-
-def test_fractional_derivative_from_rest_becomes_the_steady_one():
-    from_rest = StrainHistory(np.tile(np.sin(PHASE), 12)[None, :], np.array([[1.0 / 512]]), periodic=False)
-    last = fractional_derivative(from_rest, 0.3)[:, -512:]
-    assert first_harmonic(last) / -1j == pytest.approx((2j * np.pi) ** 0.3, rel=1e-2)
-
-
-def test_a_slider_loses_four_times_its_yield_force_times_its_slip():
-    history = steady(1.0, amplitude=0.05)
-    stress = sliders(history, np.array([1e6]), np.array([0.01]))[0]
-    loss = np.sum(0.5 * (stress + np.roll(stress, 1)) * np.diff(history.strain[0], prepend=history.strain[0, -1]))
-    assert loss == pytest.approx(4.0 * 1e4 * (0.05 - 0.01), rel=2e-3)
 
 
 @pytest.mark.parametrize("rubber", RUBBERS)

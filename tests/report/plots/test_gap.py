@@ -1,13 +1,11 @@
 """The gap before and after: one scale, right signs and sizes; and the picture of a batch says what is out of limits."""
 
 from collections.abc import Callable
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-import pandas as pd
 import pytest
-from figures import gap, legend, points, titles, whole
+from figures import gap, legend, whole
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
@@ -15,8 +13,6 @@ from matplotlib.figure import Figure
 from bushfit.fitting.preparation import MeasuredTest
 from bushfit.geometry import Direction
 from bushfit.model.model import Model
-from bushfit.report.plots.batch import batch_figure
-from bushfit.report.plots.style import to_image
 
 Heavier = Callable[[float], Model]
 
@@ -92,27 +88,3 @@ def test_loops_are_means_in_percent_of_half_the_force_range(paper_model, stiff, 
     assert legend(axes) == ["1 mm, 0.1 Hz"]
     after_turn = gap(stiff, paper_model, [data_set]).axes[0].get_lines()[0].get_ydata()[0]
     assert after_turn == pytest.approx(-20.0, abs=1.5), "20 % below at the upper turn"
-
-
-@pytest.mark.parametrize("count", [10, 20_000])
-def test_medians_limits_and_names(count):
-    """One far out must not squash the rest, one is not known, one of the quantities is the same for all."""
-    values = np.random.default_rng(3).normal(1.0, 0.02, count)
-    values[[1, 4, 5]] = 1.5, np.nan, 40.0 if count > 100 else 1.0
-    names, out = [f"$name {n}" for n in range(count)], values > 1.2
-    parts = [SimpleNamespace(name=name, misses={"mu": ""} if bad else {}) for name, bad in zip(names, out, strict=True)]
-    limits = {"mu [MPa]": SimpleNamespace(min=None, max=1.2), "alpha [-]": SimpleNamespace(min=None, max=None)}
-    batch: Any = SimpleNamespace(title="x", parts=parts, quantities=limits)
-    table = pd.DataFrame({"mu [MPa]": values, "alpha [-]": 0.24})
-    figure = batch_figure(batch, table)
-    assert to_image(figure) == to_image(batch_figure(batch, table))
-    axes, other = figure.axes[:2]
-    heights = {float(line.get_ydata()[0]) for line in axes.lines if len(set(np.atleast_1d(line.get_ydata()))) == 1}
-    assert {float(np.nanmedian(values)), 1.2} <= heights
-    low, high = axes.get_ylim()
-    assert low < 1.0 < 1.2 < high < 2.0
-    assert titles(figure)[0].startswith(f"mu [MPa]: {out.sum()} out\n")
-    assert titles(figure)[0].endswith(", ".join(f"$name {k}" for k in np.flatnonzero(out)[:3]))
-    assert sum(len(line.get_xdata()) for line in points(axes)) == count - 1, "each bushing that has a value, once"
-    assert sum(len(line.get_xdata()) for line in points(axes) if line.get_color() == "#c1272d") == out.sum()
-    assert other.get_ylim()[0] < 0.24 < other.get_ylim()[1]
