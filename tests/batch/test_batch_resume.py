@@ -17,8 +17,7 @@ from trees import PATTERN, command, kept, list_many, stamps, tree, wait_for
 from bushfit.batch import store
 from bushfit.batch.document import RowFile
 from bushfit.batch.executor import local_workers, run_rows
-from bushfit.batch.manifest import Row, RowSettings, read_manifest
-from bushfit.batch.quantities import parse_point
+from bushfit.batch.manifest import Row, RowSettings
 from bushfit.batch.row import RowTask
 from bushfit.errors import BatchError
 from bushfit.report.results import Formats
@@ -142,12 +141,3 @@ def test_a_worker_of_another_version_or_none_that_lives_ends_the_batch(tmp_path)
 
 def die() -> None:
     os.kill(os.getpid(), signal.SIGKILL)
-
-
-def test_the_key_changes_with_all_that_the_answer_depends_on(shop):
-    row = read_manifest(str(shop / PATTERN), RowSettings()).rows[0]
-    other, plain = replace(row, settings=replace(row.settings, effects=("inertia",))), Formats(pictures=False)
-    points = (parse_point("axial 25 Hz 0.1 mm"),)
-    asked = [(row, (), plain), (row, points, plain), (row, (), Formats()), (other, (), plain)]
-    assert len({store.row_key(*each) for each in asked}) == 4
-    assert store.row_key(row, points, plain) == store.row_key(*asked[1])

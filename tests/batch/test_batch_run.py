@@ -138,24 +138,6 @@ def test_a_parameter_on_a_bound_of_its_fit_passes_on_condition_and_is_named(type
     assert not any("inertia" in row["on a bound"] for row in rows(shop / "none")), "no mass is an answer"
 
 
-def test_limits_on_what_a_row_does_not_have(typed, shop):
-    (shop / "limits.toml").write_text('verdicts = ["consistent"]\n')
-    refused = typed("batch", PATTERN, "-o", "all", "--limits", "limits.toml", status=2)
-    assert all(word in refused.stderr for word in ("limits.toml, verdicts", "b0 and 4 more", "--command diagnose"))
-    assert not (shop / "all").exists()
-    (shop / "limits.toml").write_text("[parameters.'inertia.mass']\nmax = '1 kg'\n")
-    (shop / "m.csv").write_text(
-        "campaign,name,effects\nbushings/b0/bushing.toml,without,\nbushings/b0/bushing.toml,with,inertia\n"
-    )
-    typed("batch", "m.csv", "-o", "all", "--limits", "limits.toml", "-q", status=1)
-    without, with_ = rows(shop / "all")
-    assert (without["limits"], without["out of limits"]) == ("fail", "inertia.mass is not known")
-    assert float(with_["inertia.mass [kg]"]) < 1
-    assert (shop / "all/batch.png").exists(), "the picture shows what is known"
-    typed("batch", "m.csv", "-o", "all", "--force", "--no-plots")
-    assert not (shop / "all/batch.png").exists(), "a picture of another run"
-
-
 def deadly(task: RowTask, part: Row) -> tuple[RowFile, bool]:
     """The work, but the bushing b2 kills its process, as a system without memory does."""
     if part.name == "b2":

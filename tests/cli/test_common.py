@@ -275,18 +275,6 @@ def test_a_terminal_is_shown_how_far_it_is(work, tmp_path, monkeypatch):
     assert re.search(r"[0-5]/5", profiled)
 
 
-@pytest.mark.parametrize(
-    ("heard", "patience", "more"),
-    [(io.StringIO, 0.0, ()), (Terminal, 0.0, ("--quiet",)), (Terminal, 60.0, ())],
-    ids=["no terminal", "quiet", "quick"],
-)
-def test_nobody_else_is(work, tmp_path, monkeypatch, heard, patience, more):
-    monkeypatch.setattr(common, "_PATIENCE", patience)
-    told = said(work, monkeypatch, heard(), *SIMULATE, *more, "-o", tmp_path / "x")
-    assert "simulated " not in told
-    assert "\x1b[?25" not in told, "the cursor is left alone"
-
-
 def test_the_manual_is_one_file_whose_links_stay_in_it(bushfit, root, tmp_path):
     bushfit("manual", "diagnosis", "-o", tmp_path / "m")
     text = (tmp_path / "m/manual.html").read_text(encoding="utf-8")

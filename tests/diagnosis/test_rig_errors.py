@@ -16,7 +16,7 @@ from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.problem import FitResult
 
 RIG = RigSettings(gain_error=4e-3, phase_error=3.5e-3)
-RUN, LEVEL, WAVE, LOOP = range(4)
+RUN, LEVEL = 0, 1
 
 
 def off(evidence: FitResult, sweep: MeasuredSweep, change: Callable[[MeasuredSweep], Array]) -> Array:

@@ -1,18 +1,16 @@
 """Effects against simpler ones and numbers worked out without them; friction against a walk from point to point."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
 import scipy.stats
 
-from bushfit.effects import BASE, LIBRARY, History, Layer, distributed_sliders, qualified_name, sliders
+from bushfit.effects import BASE, History, distributed_sliders, sliders
 from bushfit.effects.contract import RubberConditions
 from bushfit.effects.dead_zone import first_harmonic
-from bushfit.effects.friction import _strokes, mean_stress_decay
 from bushfit.effects.temperature import log_shift
-from bushfit.geometry import Bushing, Direction, Specimen
+from bushfit.geometry import Bushing, Direction
 from bushfit.model.model import Model
 from bushfit.units import CELSIUS
 
@@ -57,56 +55,6 @@ def same(one: Model, other: Model, tolerance: float) -> None:
 )
 def test_at_the_end_of_its_range_an_effect_is_a_simpler_one(one, other, tolerance):
     same(one, other, tolerance)
-
-
-def test_a_fixture_from_rest_rings_down_to_its_steady_state():
-    model = added("fixture_resonance", mass=0.1, frequency=60.0, damping=0.2)
-    last = slice(-2048, None)
-    tail = History.steady(STARTED.value[last], 20.0)
-    extra = (model.force("axial", STARTED) - PLAIN.force("axial", STARTED))[last]
-    steady = model.force("axial", tail) - PLAIN.force("axial", tail)
-    assert np.max(np.abs(extra - steady)) < 1e-4 * np.max(np.abs(steady))
-
-
-@pytest.mark.parametrize("history", [LOOP, STARTED], ids=["steady", "from rest"])
-@pytest.mark.parametrize(
-    "alone",
-    [
-        added("strain_stiffening", c3=60.0),
-        added("viscous", eta=300.0),
-        added("bump_stop", gap=3e-4, stiffness=1e6),
-        added("clearance", delta=4e-5),
-        added("self_heating", beta=1e-2),
-    ],
-    ids=lambda model: model.effects[-1],
-)
-def test_rig_and_bushing_share_the_motion(alone, history):
-    """x = x_b + c F, where F is what the bushing alone answers to x_b."""
-    force = added("rig_compliance", alone, compliance=4e-8).force("radial", replace(history, solved={}))
-    again = alone.force("radial", history.with_value(history.value - 4e-8 * force))
-    assert np.max(np.abs(again - force)) < 1e-9 * np.max(np.abs(force))
-
-
-@pytest.mark.parametrize("effect", [effect for effect in LIBRARY.values() if effect.corrects], ids=lambda one: one.name)
-def test_what_corrects_a_formula_scales_that_direction_and_no_other(effect):
-    (parameter,) = effect.parameters
-    model = PLAIN.with_effect(effect.name, {qualified_name(effect, parameter): parameter.value_at_share(1.0)})
-    for direction in Direction:
-        factor = parameter.value_at_share(1.0) if direction == effect.corrects else 1.0
-        plain = PLAIN.stiffness(direction, FREQUENCY, AMPLITUDE)
-        np.testing.assert_allclose(model.stiffness(direction, FREQUENCY, AMPLITUDE), factor * plain, rtol=1e-14)
-        np.testing.assert_allclose(model.force(direction, LOOP), factor * PLAIN.force(direction, LOOP), rtol=1e-14)
-
-
-@pytest.mark.parametrize(
-    "effect", [one for one in LIBRARY.values() if isinstance(one, Layer)], ids=lambda one: one.name
-)
-def test_rig_and_sleeve_act_neither_on_a_modulus_nor_all_in_torsion(effect):
-    values = {qualified_name(effect, parameter): parameter.value_at_share(0.5) for parameter in effect.parameters}
-    model, coupon = PLAIN.with_effect(effect.name, values), Specimen("coupon", "modulus")
-    for place in (coupon, *([] if effect.turns else [Direction.TORSION])):
-        stiffness = [one.stiffness(place, FREQUENCY, 20.0 * AMPLITUDE, kind="sweep") for one in (model, PLAIN)]
-        np.testing.assert_array_equal(*stiffness)
 
 
 @pytest.mark.parametrize("shift", [0.01, 0.03, 0.13])
@@ -192,12 +140,3 @@ def test_sliders_are_the_mean_of_very_many(strain):
     many = 5e5 * np.mean(jenkins_element(np.minimum(normal / strain, 1.0)))
     values = {"delta": 5e5, "e_s": 0.01, "spread": 0.9}
     np.testing.assert_allclose(distributed_sliders.modulus(values, omega, np.array([strain])), many, rtol=2e-4)
-
-
-@pytest.mark.parametrize("x", [1e-3, 0.3, 1.0, 20.0])
-def test_a_cycle_lowers_a_mean_stress_as_the_walk_along_it_does(x):
-    begin = 2.0 * x / (math.sqrt(x * (x + 6.0) + 1.0) + x + 1.0)
-    path = _strokes([-1.0, 1.0], [2.0 * x, 2.0 * x], begin)
-    end, kept = path[-1]
-    assert end == pytest.approx(begin, rel=1e-12)
-    assert -math.log(kept) == pytest.approx(float(mean_stress_decay(np.array(x))), rel=1e-9)

@@ -1,6 +1,7 @@
 """Preload as a variable: the truth is integrated in time about a static strain, by a program independent of bushfit.
 
-The elastic stress is a power series, friction is Berg's law over ten cycles, and the springpot is that of a sine.
+The elastic stress is a power series, friction is Berg's law by the rig of the scorecard, and the springpot is that of a
+sine.
 Friction and springpot follow the preload by straight lines, which the fit does not know.
 """
 
@@ -14,6 +15,7 @@ import pytest
 from fits import held_by_bands, joint_fit
 from scipy.optimize import brentq
 from scipy.stats import binomtest
+from time_rig import friction
 from tries import SEEDS
 
 from bushfit.campaign.campaign import Campaign
@@ -50,16 +52,9 @@ class Rubber:
 
 @cache
 def friction_modulus(strain: float) -> complex:
-    """First harmonic of Berg's friction over its tenth cycle [Pa]."""
-    motion = strain * np.sin(2.0 * np.pi * np.arange(10 * SAMPLES) / SAMPLES)
-    stress, turn, stress_at_turn, sense = np.zeros(motion.size), 0.0, 0.0, 0.0
-    for i, step in enumerate(np.sign(np.diff(motion)), start=1):
-        if step != sense and sense:
-            turn, stress_at_turn = motion[i - 1], stress[i - 1]
-        sense = step
-        way, left = motion[i] - turn, SIGMA - step * stress_at_turn
-        stress[i] = stress_at_turn + way * left / (EPS * left / SIGMA + abs(way))
-    return first_harmonic(stress[-SAMPLES:], strain)
+    """First harmonic of the friction over a steady cycle [Pa]."""
+    motion = strain * np.sin(2.0 * np.pi * np.arange(SAMPLES) / SAMPLES)
+    return first_harmonic(friction(motion[None], SIGMA, EPS)[0], strain)
 
 
 def first_harmonic(stress: np.ndarray, strain: float) -> complex:

@@ -5,8 +5,6 @@ from pathlib import Path
 
 import bombs
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from mutations import INPUTS, LINES, faults, wrong_end
 from tries import some
 
@@ -59,16 +57,6 @@ def test_the_corpus(name, tmp_path):
     assert len(inputs) >= 10
     for file in inputs:
         assert_clear(name, file.read_bytes(), tmp_path)
-
-
-@pytest.mark.hypothesis
-@pytest.mark.parametrize("name", ["readers", "campaign", "model"])
-def test_whatever_the_bytes(name, tmp_path):
-    @given(st.binary(max_size=300) | st.text(max_size=300).map(lambda text: text.encode("utf-8", "surrogatepass")))
-    def check(data: bytes) -> None:
-        assert_clear(name, data, tmp_path)
-
-    check()
 
 
 @pytest.mark.parametrize("command", some(LINES, {"predict", "inspect", "simulate", "export", "reduce"}))

@@ -190,15 +190,6 @@ def test_each_fault_of_a_sweep_is_told(sweep, tmp_path, said):
     assert any(said in sentence for sentence in odd), odd
 
 
-def test_repeats_that_nothing_tells_are_asked_for(sweep, tmp_path):
-    """A repeat lost and levels missed by up to 12 %: no rule groups them."""
-    table = raw_sweep_table(sweep).drop(columns="repeat").iloc[1:]
-    table["amplitude [mm]"] *= 1.0 + 0.12 * np.random.default_rng(1).uniform(-1.0, 1.0, len(table))
-    table.sample(frac=1.0, random_state=1).to_csv(tmp_path / "axial.csv", index=False)
-    odd = inspect_file(tmp_path / "axial.csv", {}).odd
-    assert any("if the levels are repeats, number the repeats in a column repeat" in sentence for sentence in odd)
-
-
 @pytest.mark.parametrize(
     ("name", "said"),
     [

@@ -1,7 +1,6 @@
 """Force at five times the tested amplitude, of rubber whose law the fit does not know: in the band, or with a warning.
 
-The truths are laws of the library with random parameters, and a rubber that shares no code with it: a power law in
-frequency and 40 sliders with yield strains at normal quantiles.
+The truths are laws of the library with random parameters, and a rubber of the scorecard that shares no code with it.
 """
 
 from collections.abc import Callable
@@ -11,8 +10,9 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from fits import joint_fit
-from scipy.signal import lfilter
-from scipy.stats import norm
+from other_rubbers import log_normal_sliders
+from rubber_in_time import StrainHistory
+from time_rig import first_harmonic
 from tries import SEEDS
 
 from bushfit.campaign.campaign import Campaign
@@ -53,31 +53,16 @@ def of_library(random: np.random.Generator, effect: str | None, values: dict[str
 
 
 def other_rubber(random: np.random.Generator) -> Truth:
-    modulus, power, delta = 2e6 * random.uniform(0.6, 1.6, 3) * (0.5, 0.02, 0.5)
-    alpha = random.uniform(0.2, 0.4)
-    yields = np.exp(
-        np.log(random.uniform(2e-3, 2e-2)) + random.uniform(0.7, 1.5) * norm.ppf((np.arange(40) + 0.5) / 40)
-    )
-
-    def sliders(strain: Array) -> Array:
-        stretch, stress, last = np.zeros(40), np.empty(strain.size), 0.0
-        for row, value in enumerate(strain):
-            stretch = np.clip(stretch + value - last, -yields, yields)
-            stress[row], last = 2.0 * delta * stretch.mean(), value
-        return stress
+    law = log_normal_sliders(random)
 
     def stiffness(frequency: Array, amplitude: float) -> Array:
-        phase = 2.0 * np.pi * np.arange(4000) / 1000.0
-        reach = amplitude * STRAIN
-        friction = 1j * np.mean((sliders(reach * np.sin(phase)) * np.exp(-1j * phase))[-1000:]) / reach
-        return np.asarray(SIZE * (modulus + friction + power * (2j * np.pi * frequency) ** alpha))
+        wave = np.tile(amplitude * STRAIN * np.sin(2.0 * np.pi * np.arange(512) / 512), (frequency.size, 1))
+        stress = law(StrainHistory(wave, 1.0 / (512 * frequency[:, None]), periodic=True))
+        return np.asarray(SIZE * first_harmonic(stress) / (2.0 * first_harmonic(wave)))
 
     def force(history: History) -> Array:
-        strain, j = STRAIN * history.value, np.arange(1, history.value.size)
-        weights = np.cumprod(np.concatenate([[1.0], (j - 1.0 - alpha) / j]))
-        viscous = history.step**-alpha * lfilter(weights, 1.0, strain)
-        stress = 2.0 * modulus * strain + sliders(strain) + 2.0 * power * viscous
-        return np.asarray(SIZE * stress / (2.0 * STRAIN))
+        strain = StrainHistory(STRAIN * history.value[None], np.array([[history.step]]), periodic=False)
+        return np.asarray(SIZE * law(strain)[0] / (2.0 * STRAIN))
 
     return Truth(stiffness, force)
 

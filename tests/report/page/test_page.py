@@ -16,8 +16,6 @@ from reading_html import HARMFUL, LARGEST, assert_harmless, change, drawn, loads
 from bushfit.effects.history import History
 from bushfit.geometry import Direction
 from bushfit.model.file import from_document
-from bushfit.model.result import Result
-from bushfit.report.page.report import comparable_sweeps
 from bushfit.simulation.rig import wave
 
 #: Keys of the documents whose texts come from a user's files.
@@ -173,16 +171,6 @@ def test_points_are_those_of_the_tables(results):
             assert panel.shape[1] >= 12
 
 
-def test_the_table_of_the_gap_is_measured_minus_model(results):
-    gap = pd.read_csv(results("mystery_mount") / "gap.csv")
-    radial = gap[(gap["direction"] == "radial") & (gap["kind"] == "sweep")]
-    assert radial["storage before [%]"].mean() < -2.0, "the plain model is stiffer than what was measured"
-    difference = 1.0 - radial["model stiffness [N/mm]"] / radial["stiffness [N/mm]"]
-    assert 100 * difference.mean() == pytest.approx(radial["storage after [%]"].mean(), abs=0.1)
-    squares = [np.mean(radial[f"storage {side} [noise]"] ** 2) for side in ("before", "after")]
-    assert squares[1] < squares[0]
-
-
 def test_names_do_no_harm(root, tmp_path):
     """Whatever stands in a text, the page has the same elements and attributes, and says it to the letter."""
     kept = root / "data/reports/mystery_mount"
@@ -195,13 +183,6 @@ def test_names_do_no_harm(root, tmp_path):
         sweeps = pd.read_csv(kept / "sweeps.csv").replace({"sweep": {"sweep_axial": name}})
         sweeps.to_csv(tmp_path / "x/sweeps.csv", index=False)
         assert_harmless(made_of(tmp_path / "x"), plain, name)
-
-
-def test_beside_a_prediction_at_23_degrees_only_sweeps_of_that_temperature_are_drawn(paper_model):
-    table = pd.DataFrame({"sweep": ["cold", "room", "none"], "temperature [degC]": [-10.0, 24.0, np.nan]})
-    warm = Result(paper_model.with_effect("temperature"))
-    shown = [comparable_sweeps(table, result) for result in (warm, Result(paper_model))]
-    assert [list(rows["sweep"]) for rows in shown if rows is not None] == [["room", "none"], ["cold", "room", "none"]]
 
 
 def bare(page: str) -> str:

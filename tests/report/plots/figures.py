@@ -89,11 +89,6 @@ def labels(figure: Figure) -> list[str]:
     return [" ".join(name.split()) for name in names]
 
 
-def titles(figure: Figure) -> list[str]:
-    """What stands left above the panels."""
-    return [title for axes in figure.axes if (title := axes.get_title(loc="left"))]
-
-
 def legend(axes: Axes) -> list[str]:
     box = axes.get_legend()
     return [] if box is None else [text.get_text() for text in box.get_texts()]

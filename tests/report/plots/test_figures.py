@@ -1,9 +1,5 @@
 """Figures of predictions, fits, raw files, reductions and Maxwell arms: each point is drawn where it was measured."""
 
-import os
-import subprocess
-import sys
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -33,26 +29,6 @@ from bushfit.reduction.steps import reduce
 from bushfit.report.plots.inspection import inspection_figure, reduction_figure
 
 LONG_NAME = "a file whose name tells all that is known of the test " * 3
-
-
-def test_settings_of_the_user_do_not_matter(root, tmp_path):
-    """A backend of a notebook, LaTeX, an unknown font and a misspelt key in matplotlibrc."""
-    (tmp_path / "matplotlibrc").write_text("text.usetex: True\nfont.family: No Such Font\nno.such.key: 1\n")
-    folders = [tmp_path / "own", tmp_path / "plain"]
-    for folder, settings in zip(folders, ({"MPLBACKEND": "none", "MATPLOTLIBRC": str(tmp_path)}, {}), strict=True):
-        command = "from bushfit.cli import main; main()"
-        arguments = ("fit-static", root / "configs/cmp_15961.toml", "-q", "-o", folder)
-        run = [sys.executable, "-c", command, *map(str, arguments)]
-        done = subprocess.run(run, env={**os.environ, **settings}, check=True, capture_output=True)
-        assert done.stderr == b""
-    images = [(folder / "loops.png").read_bytes() for folder in folders]
-    assert images[0] == images[1]
-    (tmp_path / "matplotlibrc").write_bytes(b"lines.linewidth: 2\n# \xff\n")  # which stops matplotlib at its import
-    environment = {**os.environ, "MATPLOTLIBRC": str(tmp_path)}
-    done = subprocess.run([*run[:-1], str(tmp_path / "saved")], env=environment, check=False, capture_output=True)
-    assert (done.returncode, done.stderr.count(b"rror: ")) == (2, 1)
-    assert b"error: matplotlibrc" in done.stderr
-    assert (tmp_path / "saved/static.json").exists()
 
 
 def test_differences_are_measured_minus_model_everywhere(paper_model, stiff, swept, looped):
@@ -117,23 +93,6 @@ def test_sweeps_of_many_amplitudes(paper_model, swept, count):
     assert len(points(left)) == count
     assert len(right.child_axes) == (count > 8)
     assert right.child_axes or len(legend(right)) == count
-
-
-@pytest.mark.parametrize(
-    ("stepped", "held", "levels", "scale"),
-    [("amplitude", "frequency", ["35 Hz", "5 Hz"], 1e3), ("frequency", "amplitude", ["0.1 mm", "0.2 mm", "0.5 mm"], 1)],
-)
-def test_a_sweep_is_drawn_over_its_steps(paper_model, swept, stepped, held, levels, scale):
-    sweep = replace(swept(paper_model, frequencies=np.array([5.0, 35.0])).sweep, stepped=stepped)
-    seen = Inspection(Path("x.csv"), "sweep", Direction.AXIAL, {}, (), {}, (), {}, sweep)
-    figure = whole(inspection_figure([seen]))
-    assert {name.split()[0] for name in labels(figure)[::2]} == {stepped}
-    assert legend(figure.axes[1]) == levels
-    for row, level in enumerate(np.unique(getattr(sweep, held))):
-        rows = getattr(sweep, held) == level
-        drawn = points(figure.axes[0])[row]
-        np.testing.assert_allclose(drawn.get_xdata(), scale * getattr(sweep, stepped)[rows])
-        np.testing.assert_allclose(drawn.get_ydata(), 1e-3 * np.abs(sweep.stiffness[rows]))
 
 
 def test_a_reduction_shows_the_cycles_used_and_twice_the_standard_error(root):
