@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import strategies as st
 
 from bushfit.batch.document import Estimate, RowFile
 from bushfit.batch.limits import RESULTS, Limits, judge_part, read_limits, resolve_limits
@@ -14,7 +13,6 @@ from bushfit.batch.quantities import list_quantities, parse_point
 from bushfit.reduction.arrays import median_and_scatter
 
 ROW = '[[bushings]]\ncampaign = "a.toml"\n'
-finite = st.floats(-1e3, 1e3)
 
 
 def written(folder: Path, text: str, name: str = "m.toml") -> str:
