@@ -5,6 +5,7 @@ import os
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -108,8 +109,9 @@ def load_campaign(path: str | Path) -> Campaign:
         _check_places(content, specimens)
     with error_location(place="[report] logo"):
         logo = embed_logo(path.parent / content.report.logo) if content.report.logo else None
+    names = iter(_test_names([*content.loops, *content.sweeps, *content.validation]))
     loops, sweeps, records = (
-        track(f"{kind} read", reader_keywords(path, tests, specimens), len(tests))
+        track(f"{kind} read", reader_keywords(path, tests, [*islice(names, len(tests))], specimens), len(tests))
         for kind, tests in (("loops", content.loops), ("sweeps", content.sweeps), ("records", content.validation))
     )
     several = " and ".join(table.name for table in content.bushings)
@@ -261,16 +263,14 @@ def refuse_tests(paths: Sequence[Path]) -> None:
 
 
 def reader_keywords(
-    path: Path, tests: Sequence[LoopFile | SweepFile], specimens: Sequence[Specimen] = ()
+    path: Path, tests: Sequence[LoopFile | SweepFile], names: Sequence[str], specimens: Sequence[Specimen] = ()
 ) -> Iterator[dict[str, Any]]:
     """Keyword arguments with which `read_loop` or `read_sweep` reads the tests of a campaign.
-
-    The name of a test is the stem of its file, or the path as the campaign lists it if two files have the same stem. If
-    one file contains several tests, sheet, temperature, direction, specimen number and selected rows are added.
 
     Args:
         path: path of the campaign file.
         tests: [[loops]] or [[sweeps]] tables.
+        names: name of each test.
         specimens: specimens of the campaign.
 
     Yields:
@@ -282,7 +282,7 @@ def reader_keywords(
     listed_tests = set()
     sources = [(os.path.normpath(path.parent / test.file), test.sheet, test.temperature) for test in tests]
     counts = Counter(sources)
-    for test, source, name in zip(tests, sources, _test_names(tests), strict=True):
+    for test, source, name in zip(tests, sources, names, strict=True):
         if (identity := (*source, test.direction, test.specimen_number, *test.rows.items())) in listed_tests:
             expected = "each file, or each sheet of a file, once"
             raise CampaignError("a file is listed twice", file=path, found=test.file, expected=expected)
@@ -303,7 +303,11 @@ def reader_keywords(
 
 
 def _test_names(tests: Sequence[LoopFile | SweepFile]) -> list[str]:
-    """Make a unique name for each test from its file, sheet and conditions."""
+    """Make a unique name for each test of a campaign.
+
+    The name is the stem of the file, or the path as the campaign lists it if two files have the same stem. If one file
+    contains several tests, sheet, temperature, direction, specimen number and selected rows are added.
+    """
     keys = ("direction", "specimen_number")
     stems, values = Counter(Path(test.file).stem for test in tests), defaultdict[str, list[tuple[Any, ...]]](list)
     for test in tests:

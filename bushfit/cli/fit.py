@@ -122,8 +122,8 @@ def _print_and_write(
     campaign, result, file = fitted.data.campaign, fitted.result, quote_path(fitted.data.campaign.path)
     written = quote_path(folder / f"{fitted.files[0].name}.json")
     verdict, action = "nothing was fitted: the tests are not compared", f"bushfit predict {written}"
+    misses = any(re.search(r"\bmiss(es)? the (tests|data)\b", line) for line in result.warnings)
     if quality := result.quality:
-        misses = any(re.search(r"\bmiss(es)? the (tests|data)\b", line) for line in result.warnings)
         figures = (
             f"NRMSE {number(100 * quality.nrmse, 2)} %, reduced chi-square {number(quality.reduced_chi_square, 3)}"
         )
@@ -135,7 +135,7 @@ def _print_and_write(
         action = f"bushfit fit-dynamic {file} --static {written} fits m and alpha"
     elif units := next((line for line in result.warnings if re.search("impossible for rubber.*units", line)), ""):
         verdict, action = units, f"bushfit diagnose {file} finds the file with the wrong unit"
-    elif left_open := result.covariance.describe_unknown(result.model.values):
+    elif not misses and (left_open := result.covariance.describe_unknown(result.model.values)):
         verdict, action = left_open, f"bushfit plan {file} --hours 1 chooses tests that determine them"
     output.print_headline(campaign.name, verdict, f"next: {action}")
     for title, step in fitted.steps:

@@ -151,7 +151,7 @@ def reader_arguments(
     tested = {} if specimens else {"direction": str(place)}
     test = validate_tables({**entry, "file": str(file), **tested}, file, schema)
     with error_location(file, "at_amplitude"):  # which alone is converted there
-        return {**next(reader_keywords(Path(), [test], specimens)), "file": table.opened, "name": file.stem}
+        return {**next(reader_keywords(Path(), [test], [file.stem], specimens)), "file": table.opened}
 
 
 def read_either_sign(table: Table, place: Place, entry: dict[str, Any]) -> tuple[Loop, dict[str, Any], list[str]]:

@@ -62,6 +62,10 @@ def test_a_sheet_of_a_workbook(typed, root, tmp_path):
         done = typed("inspect", "tests axial.xlsx", "--sheet", sheet, "--no-plots")
         assert f"sheet {sheet}" in done.stderr
         assert tomllib.loads(done.stdout)[kind][0]["sheet"] == sheet
+    sizes = ("--inner-radius", "10 mm", "--outer-radius", "18 mm", "--length", "34 mm")
+    typed("init", "tests axial.xlsx", *sizes, "-o", "x")
+    campaign = load_campaign(tmp_path / "x/campaign.toml")
+    assert [test.name for test in (*campaign.loops, *campaign.sweeps)] == ["tests axial loop", "tests axial sweep"]
 
 
 def sweeps(folder: Path, *headers: str, cells: str = "0.1,{},0.1") -> list[str]:
