@@ -105,9 +105,9 @@ def print_verdict(output: Output, diagnosed: DiagnosisOutput, action: str = "") 
     output.print_headline(diagnosed.data.campaign.name, diagnosed.headline, action, f"bold {colour}")
     for line in (diagnosed.diagnosis.summary, *format_odds(diagnosed.document)):
         output.console.print(f"  {escape(line)}")
-    if diagnosed.diagnosis.adopt:
+    if diagnosed.adopt:
         cause = "the first" if diagnosed.diagnosis.verdict == "ambiguous" else "this"
-        output.console.print(f"  if you know that {cause} is the cause: {escape(diagnosed.diagnosis.adopt)}")
+        output.print(f"  if you know that {cause} is the cause: {diagnosed.adopt}")
 
 
 def print_findings(output: Output, diagnosed: DiagnosisOutput) -> None:

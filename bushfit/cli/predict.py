@@ -134,8 +134,9 @@ def _print_summary(output: Output, predicted: PredictionOutput) -> None:
     action = "The prediction may be used: there are no warnings."
     if warnings := by_importance(predicted.warnings):
         verdict += f", with {len(warnings)} warning{'s' * (len(warnings) > 1)}"
-        place, colon, _ = warnings[0].partition(": ")
-        action = f"{place}{colon}{consequence_of(warnings[0])}" if place in places else consequence_of(warnings[0])
+        place = warnings[0].partition(": ")[0]
+        subject = f"{place}: " if place in places else ""
+        action = f"first warning below: {subject}{consequence_of(warnings[0])}"
     output.print_headline(predicted.result.name, verdict, action)
     for prediction in predicted.predictions:
         force, loss = prediction.direction.display.stiffness, prediction.loss_factor.value

@@ -14,7 +14,8 @@ from bushfit.commands.provenance import campaign_document, option_words, result_
 from bushfit.commands.respond import validation_files
 from bushfit.diagnosis import workflow
 from bushfit.diagnosis.document import DiagnosisFile
-from bushfit.diagnosis.record import Diagnosis, DiagnosisSettings
+from bushfit.diagnosis.record import Diagnosis, DiagnosisSettings, level_of
+from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.errors import FitError, quote_path
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.procedures import NEXT
@@ -57,6 +58,19 @@ class DiagnosisOutput:
         return "; ".join(filter(None, (self.diagnosis.verdict, unknown)))
 
     @property
+    def adopt(self) -> str:
+        """Command that diagnoses the campaign with the named causes adopted.
+
+        It is "" without such a cause, and if the only thing it would add is in the model already and certain: effects
+        of a verdict "named" that are no mistake and have no twin.
+        """
+        causes = [entry for entry in self.diagnosis.effects if entry.name != UNNAMED]
+        if self.diagnosis.verdict == "named" and not any(level_of(e.name) in ("record", "unresolved") for e in causes):
+            return ""
+        options = "".join(f" --adopt {entry.label}" for entry in causes)
+        return options and f"bushfit diagnose {_printed_path(self.data.campaign)}{options}"
+
+    @property
     def result(self) -> Result:
         """Fitted model to use: the joint fit, or the model with the effects that the diagnosis added."""
         return self.diagnosis.result
@@ -95,7 +109,7 @@ def diagnose(
     unresolved = [name for name in start.unresolved if name not in adopt] if start else []
     settings = DiagnosisSettings(max_effects, tolerance, tuple(adopt), tuple(without), tuple(unresolved))
     _require_free_parameter(data, start.model if start else None, settings)
-    diagnosis = _with_plan(workflow.diagnose(data, start.model if start else None, settings), data.campaign)
+    diagnosis = _with_commands(workflow.diagnose(data, start.model if start else None, settings), data.campaign)
     if not (diagnosis.changed or start or adopt):  # the model to use is that of fit
         plain = (joint or fit(data)).result
         plain = replace(plain, warnings=tuple(line.removesuffix(NEXT) for line in plain.warnings))
@@ -154,16 +168,23 @@ def _require_free_parameter(data: PreparedCampaign, model: Model | None, setting
         )
 
 
-def _with_plan(diagnosis: Diagnosis, campaign: Campaign) -> Diagnosis:
-    """Add to the next test a command `bushfit plan` for tests that separate the candidate effects.
+def _printed_path(campaign: Campaign) -> str:
+    """Path of a campaign in a printed command; only its name if it is absolute, as results hold no machine's paths."""
+    return quote_path(Path(campaign.path.name) if campaign.path.is_absolute() else campaign.path)
+
+
+def _with_commands(diagnosis: Diagnosis, campaign: Campaign) -> Diagnosis:
+    """Complete the commands in the texts of a diagnosis: path of the campaign, and a plan that separates candidates.
 
     Args:
-        diagnosis: the diagnosis; one without several candidate effects is returned unchanged.
-        campaign: campaign of the diagnosis.
+        diagnosis: the diagnosis.
+        campaign: campaign of the diagnosis; if it is not from a file, the diagnosis is returned unchanged.
     """
-    path = campaign.path
-    if path.suffix != ".toml" or not (sets := undecided_effects(diagnosis)):
+    if campaign.path.suffix != ".toml":
         return diagnosis
-    printed_path = Path(path.name) if path.is_absolute() else path  # results hold no path of a machine
-    command = f"bushfit plan {quote_path(printed_path)} --rivals {','.join(sets[0])}"
-    return replace(diagnosis, next_test=f"{diagnosis.next_test}; {command} selects tests that distinguish them")
+    path, next_test = _printed_path(campaign), diagnosis.next_test
+    if sets := undecided_effects(diagnosis):
+        next_test += f"; bushfit plan CAMPAIGN --rivals {','.join(sets[0])} selects tests that distinguish them"
+    warnings = tuple(line.replace("CAMPAIGN", path) for line in diagnosis.result.warnings)
+    result = replace(diagnosis.result, warnings=warnings)
+    return replace(diagnosis, next_test=next_test.replace("CAMPAIGN", path), result=result)

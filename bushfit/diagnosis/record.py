@@ -205,12 +205,6 @@ class Diagnosis:
     odds: Odds = Odds(1.0)
 
     @property
-    def adopt(self) -> str:
-        """Command that diagnoses the campaign with the named effects and mistakes adopted; "" if none is named."""
-        options = [f"--adopt {entry.label}" for entry in self.effects if entry.name != UNNAMED]
-        return f"bushfit diagnose CAMPAIGN {' '.join(options)}" if options else ""
-
-    @property
     def changed(self) -> bool:
         """True if added effects or a corrected record make the final fit differ from the starting fit."""
         return self.after is not self.before
