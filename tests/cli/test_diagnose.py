@@ -156,8 +156,8 @@ def test_look_alikes_are_told_with_their_odds(work, bushfit):
 
 def test_it_is_told_with_its_line_and_nothing_is_mended(bushfit, work):
     done = bushfit("diagnose", DOUBLED, "-o", "doubled_told")
-    command = f"bushfit diagnose {DOUBLED} --adopt {LABEL}"
-    for words in ("these tests agree if the", "sweep_axial.csv are peak-to-peak", 'amplitude = "peak-to-peak"', command):
+    adopt = f"bushfit diagnose {DOUBLED} --adopt {LABEL}"
+    for words in ("these tests agree if the", "sweep_axial.csv are peak-to-peak", 'amplitude = "peak-to-peak"', adopt):
         assert words in " ".join(done.stderr.split())
     written, model = (document(work / f"doubled_told/{name}.json") for name in ("diagnosis", "model"))
     (effect,) = written["effects"]
