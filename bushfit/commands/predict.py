@@ -142,7 +142,7 @@ def predict(
         drawn = [
             sweep
             for sweep in drawn_sweeps
-            if sweep.direction == place and (preload is None or preload.equals(sweep.sweep.preload))
+            if sweep.direction == place and (preload is None or preload.equals(sweep.test.preload))
         ]
         prediction = predict_stiffness(
             result,

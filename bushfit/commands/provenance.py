@@ -89,7 +89,7 @@ def input_files(campaign: Campaign | None, *others: Path | None) -> list[Path]:
 
 def _test_document(data_set: MeasuredTest) -> dict[str, Any]:
     """Description of a test for result files: direction or specimen, ranges [SI], file, and stated conditions."""
-    source, sweep = data_set.test.source, data_set.sweep if isinstance(data_set, MeasuredSweep) else None
+    source, sweep = data_set.test.source, data_set.test if isinstance(data_set, MeasuredSweep) else None
     return {
         "test": data_set.name,
         "kind": data_set.kind,

@@ -310,7 +310,7 @@ def _corrected_points(data_set: MeasuredTest, mistake: Mistake | None) -> tuple[
         most `_MOST_POINTS`, (n,) each.
     """
     if isinstance(data_set, MeasuredSweep):
-        sweep, noise = data_set.sweep, np.hypot(data_set.relative_noise, max(data_set.noise.shared))
+        sweep, noise = data_set.test, np.hypot(data_set.relative_noise, max(data_set.noise.shared))
         mended = (mistake and mistake.corrected_test(sweep)) or sweep
     else:
         sweep, noise = (

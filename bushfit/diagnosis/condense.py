@@ -74,8 +74,8 @@ def shorten_tests(data: PreparedCampaign) -> tuple[PreparedCampaign, tuple[str, 
     for data_set in data.sweeps:
         new, short = replace(data_set, noise=noises[id(data_set.noise)]), shortened.get(data_set)
         if short:
-            weight = np.full(short.sweep.frequency.size, data_set.sweep.weight)
-            new = replace(new, sweep=short.sweep, weight=weight, test_conditions=short.conditions)
+            weight = np.full(short.sweep.frequency.size, data_set.test.weight)
+            new = replace(new, test=short.sweep, weights=weight, test_conditions=short.conditions)
         sweeps.append(new)
     messages += tuple(f"{short.sweep.name}: {short.sentence}" for short in shortened.values())
     return replace(data, sweeps=tuple(sweeps)), messages
@@ -91,7 +91,7 @@ def _select_loops(loops: Sequence[MeasuredLoop]) -> Sequence[MeasuredLoop]:
         return loops
     times_before = np.tril(repeats_of(loops), -1).sum(axis=1)
     distinct = np.flatnonzero(times_before == 0)
-    points = np.log([(loop.prepared.frequency, loop.prepared.amplitude) for loop in loops])
+    points = np.log([(*loop.frequency, *loop.amplitude) for loop in loops])
     apart = 1e3 * np.unique(directions, return_inverse=True)[1]
     spread = distinct[spread_nodes(np.column_stack((points, apart))[distinct], distinct.size)]
     chosen = list[int]()
@@ -125,7 +125,7 @@ def _new_noise(before: SweepNoise, shortened: Sequence[_ShortSweep], rig: RigSet
 
 def _shorten_sweep(data_set: MeasuredSweep) -> _ShortSweep | None:
     """Average neighbouring points of long runs, and select some of very many levels; None for a short sweep."""
-    sweep, rows, sentence = data_set.sweep, data_set.order[data_set.weights > 0.0], ""
+    sweep, rows, sentence = data_set.test, data_set.order[data_set.weights > 0.0], ""
     levels = np.unique(sweep.held_value[rows])
     if levels.size > _MOST_LEVELS:
         some = levels[np.linspace(0, levels.size - 1, _MOST_LEVELS).round().astype(int)]
@@ -173,7 +173,7 @@ def _averaged(data_set: MeasuredSweep, rows: Array, keys: Array) -> tuple[Sweep,
     def geometric_mean(values: Array) -> Array:
         return np.where(counts > 1, np.exp(mean(np.log(values))), values[first])
 
-    sweep = data_set.sweep
+    sweep = data_set.test
     phase, error, stepped = np.angle(sweep.stiffness), sweep.relative_error, sweep.stepped
     averaged = replace(
         sweep,

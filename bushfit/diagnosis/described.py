@@ -130,7 +130,7 @@ def _hold_out_inside(before: FitResult, fitted: FitResult) -> HoldOut:
         levels, level = np.unique(sweep.held_value, return_inverse=True)
         last_repeat = (sweep.repeat == sweep.repeat.max()) & (np.ptp(sweep.repeat) > 0)
         masks = {
-            f"every third {sweep.sweep.stepped or 'point'}": (rank % 3 == 1) & (rank < rank.max()),
+            f"every third {sweep.test.stepped or 'point'}": (rank % 3 == 1) & (rank < rank.max()),
             "the middle of the held-out part": (level == levels.size // 2) & (levels.size > 2),
             "the last repeat": last_repeat,
         }

@@ -205,7 +205,7 @@ def find_faulty_parts(fit: FitResult) -> list[FaultyPart]:
             act_together=True,
             covered_rows=(fit.residual_rows[loop], fit.residual.size),
         )
-        frequency, amplitude = loop.prepared.frequency, loop.prepared.amplitude
+        frequency, amplitude = float(loop.frequency[0]), float(loop.amplitude[0])
         is_covered = any(
             test.frequency.min() / _SAME <= frequency <= test.frequency.max() * _SAME
             and test.amplitude.min() / _SAME <= amplitude <= test.amplitude.max() * _SAME
@@ -220,9 +220,9 @@ def find_faulty_parts(fit: FitResult) -> list[FaultyPart]:
 
 def _level_label(sweep: MeasuredSweep, point: int) -> str:
     """Text that names the level of a point of a sweep, given by the index of the point."""
-    if sweep.sweep.stepped == "frequency":
+    if sweep.test.stepped == "frequency":
         return f"the {sweep.direction} level {shown_amplitude(sweep.direction, sweep.amplitude[point])}"
-    if sweep.sweep.stepped == "amplitude":
+    if sweep.test.stepped == "amplitude":
         return f"the {sweep.direction} sweep of amplitudes at {sweep.frequency[point]:.4g} Hz"
     return f"run {sweep.repeat[point]} of {sweep.name}, {sweep.direction}"
 
@@ -234,7 +234,7 @@ def _levels(fit: FitResult, sweeps: Sequence[MeasuredSweep]) -> Iterator[FaultyP
         levels = np.concatenate(levels_of_direction)
         for level in np.unique(sweep.held_value):
             mask = sweep.held_value == level
-            label = add_preload(_level_label(sweep, int(np.argmax(mask))), sweep.sweep.preload, sweep.direction)
+            label = add_preload(_level_label(sweep, int(np.argmax(mask))), sweep.test.preload, sweep.direction)
             if levels.size > 1:  # in this file or in others
                 part = _common_fault(fit, "level", label, [sweep], [mask])
                 yield replace(part, may_be_physics=levels.size > 2 and level in (levels.min(), levels.max()))

@@ -105,7 +105,7 @@ def line_misfits(sweep: MeasuredSweep, model: Model) -> Iterator[LineMisfit]:
         variance = np.square(sweep.noise.random[sweep.name, float(held_value)]) + np.square(sweep.noise.shared)
         noise = np.sqrt(variance / np.median(counts) + np.square(sweep.noise.level))
         frequency, amplitude = (values[mask][first] for values in (sweep.frequency, sweep.amplitude))
-        held = sweep.name, sweep.direction, sweep.sweep.preload, sweep.sweep.stepped
+        held = sweep.name, sweep.direction, sweep.test.preload, sweep.test.stepped
         yield LineMisfit(*held, frequency, amplitude, mean, noise)
 
 
@@ -225,7 +225,7 @@ def _loop_regions(fit: FitResult) -> Iterator[MisfitRegion]:
     """Yield a region for each loop, with the harmonic in which its force deviates most from the model."""
     loops, _ = split_by_kind(fit.data_sets)
     for data_set in loops:
-        columns, amplitude = data_set.smooth_changes(), data_set.prepared.amplitude
+        columns, amplitude = data_set.smooth_changes(), float(data_set.amplitude[0])
         norms = np.maximum(np.linalg.norm(columns, axis=1), np.finfo(float).tiny)
         first = len(columns) // 2 + 1  # of the sines, which follow the mean and the cosines
         amounts = columns @ fit.residual[fit.residual_rows[data_set]] / norms
@@ -235,7 +235,7 @@ def _loop_regions(fit: FitResult) -> Iterator[MisfitRegion]:
         if share < _LEAST:
             continue
         unit, factor = data_set.direction.display.displacement
-        frequency = data_set.prepared.frequency
+        frequency = float(data_set.frequency[0])
         loop = f"the {data_set.direction} loop of {amplitude * factor:.3g} {unit} at {frequency:.3g} Hz"
         yield MisfitRegion(
             data_set.direction,

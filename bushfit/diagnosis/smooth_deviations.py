@@ -143,10 +143,10 @@ def compound_shapes(loop: MeasuredLoop) -> Array:
     """
     if loop.fundamental_only:
         return np.empty((0, loop.size))
-    phase, order = loop.prepared.phase, np.arange(3, _LAST_OVERTONE + 1, 2)[:, None]
+    phase, order = loop.phase, np.arange(3, _LAST_OVERTONE + 1, 2)[:, None]
     angle = 2.0 * np.pi * order * phase
     waves = np.concatenate([np.cos(angle) / order**2, np.sin(angle) / order**2])
-    if loop.prepared.from_rest:
+    if loop.from_rest:
         order = np.arange(_TRANSIENT_WAVES)[:, None]
         first = np.cos(np.pi * order * phase) * (phase < 1.0)
         waves = np.concatenate([waves, first / (3.0 * (1.0 + order))])
@@ -169,7 +169,7 @@ def unnamed_curves(fit: FitResult) -> list[Explanation]:
     groups: dict[str, Group] = {}
     levels: dict[tuple[str, Hashable], list[MeasuredSweep]] = defaultdict(list)  # by direction and temperature
     for sweep in sweeps:
-        kelvin = sweep.sweep.temperature
+        kelvin = sweep.test.temperature
         level = None if kelvin is None else round(float(np.mean(kelvin)) / SAME_TEMPERATURE)
         levels[str(sweep.direction), level].append(sweep)
     directions: dict[str, list[tuple[Array, Array]]] = defaultdict(list)  # masks of residuals and of operating points

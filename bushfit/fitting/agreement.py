@@ -300,10 +300,10 @@ def _runs(test: MeasuredTest) -> Iterator[tuple[dict[str, Any], Array]]:
         mask of the points of the run, (n,). A loop, and a sweep without a constant quantity, are one run with an empty
         dict.
     """
-    if not isinstance(test, MeasuredSweep) or test.sweep.stepped is None:
+    if not isinstance(test, MeasuredSweep) or test.test.stepped is None:
         yield {}, np.ones(test.frequency.size, dtype=bool)
         return
-    quantity = "amplitude" if test.sweep.stepped == "frequency" else "frequency"
+    quantity = "amplitude" if test.test.stepped == "frequency" else "frequency"
     unit = test.direction.motion.displacement_unit if quantity == "amplitude" else "Hz"
     for value in np.unique(test.held_value):
         yield {"held": quantity, "value": float(value), "unit": unit}, test.held_value == value

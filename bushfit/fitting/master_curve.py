@@ -56,7 +56,7 @@ def master_curve(result: Result, sweeps: Sequence[MeasuredSweep]) -> tuple[Shift
     """
     model, curves = result.model, []
     for sweep in sweeps:
-        if can_shift(sweep.sweep):
+        if can_shift(sweep.test):
             pace = np.broadcast_to(model.shift_factor(sweep.conditions), sweep.frequency.shape)
             at_reference = model.stiffness(sweep.direction, sweep.frequency * pace, sweep.amplitude)
             reduced = sweep.measured * at_reference / sweep.stiffness(model)

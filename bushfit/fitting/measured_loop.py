@@ -1,38 +1,58 @@
 """One measured loop with its noise: force against time, the measured displacement driving the model."""
 
-from collections.abc import Hashable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Hashable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
 from bushfit.effects.contract import Array, RubberConditions, Values
-from bushfit.fitting.loop_harmonics import SMOOTH_HARMONICS
+from bushfit.effects.history import History
+from bushfit.fitting.loop_harmonics import GRID, SMOOTH_HARMONICS, OutlierRows
 from bushfit.fitting.measured_test import MeasuredBase
-from bushfit.fitting.prepared_loop import PreparedLoop
+from bushfit.fitting.row_noise import RowNoise
 from bushfit.fitting.shared_errors import SharedErrors
 from bushfit.model.model import Model
 from bushfit.model.result import Outlier
 from bushfit.model.sensitivity import force_and_slopes
 from bushfit.reading.measurement import Loop
-from bushfit.reduction.harmonics import basis
+from bushfit.reduction.harmonics import as_complex, basis, least_squares
 
 #: Number of harmonics of the model error of a loop, and their sizes relative to that of the whole force, (25,): equal
 #: up to the last smooth one, then falling as 1/h. Their mean square is that of the whole.
 _ERROR_HARMONICS = 25
 _ERROR_SIZES = 1.0 / np.maximum(np.arange(1.0, _ERROR_HARMONICS + 1.0), SMOOTH_HARMONICS)
 _ERROR_SIZES /= np.linalg.norm(_ERROR_SIZES)
+#: How far equations over a loop's motion may be from solved, relative to it: a ten-thousandth of the noise of the best
+#: rigs. Derivatives are resolved apart from that.
+_ACCURACY = 1e-8
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class MeasuredLoop(MeasuredBase):
-    """Measured loop: force at n rows, or bins of phase, driven by the measured displacement.
+    """Measured loop, made by `prepare_loop`: force at n rows, or bins of phase, driven by the measured displacement.
 
-    Rows that are left out have no weight, see `prepare_loop`, but are kept, because the response is computed in time.
+    Rows that are left out have no weight, as at the turning points of the motion, but are kept, because the response is
+    computed in time.
 
     Args:
-        prepared: loop prepared as an input of the model.
+        test: measured loop, reduced to its steady cycles.
+        frequency: frequency of the displacement [Hz], (1,).
+        cycles: number of cycles in the loop, including fractions.
+        from_rest: True if the record begins at rest, False if the loop is settled.
+        phase: position of each row [cycles from the first row], (n,).
+        measured_force: measured force per row, or per bin of phase if the loop is long [N or N m], (n,).
+        noise: standard deviation of one row's force [N or N m].
+        coefficients: complex harmonics of the displacement, mean first [m or rad].
+        half_range: half of the range of the measured force without outliers [N or N m].
+        datum: mean force [N or N m] that the fit subtracts, because a zero error of the sensor, a preload and the
+            memory of the rubber cannot be distinguished: the motion is not about zero or starts from rest at another
+            position, the force has a preload, or other cycles precede the loop. None: the fit uses the force itself.
+        record_notes: sentences on parts of the record that were left out, and on times that do not agree with the rows.
+        faulty_rows: by column, indices of faulty rows and their distances from the harmonics in units of noise.
+        first_row: index of the loop's first row in the whole record.
+        row_noise: correlation of the noise of a row with that of the rows before.
         fundamental_only: True to use only the first harmonic of the residuals, so that the loop is one operating point
             with two residuals. This is needed if a stiffness is added that is known only at the loop's frequency.
         gain_error: standard deviation of the relative gain error of the whole record, from the accuracy class of its
@@ -41,27 +61,38 @@ class MeasuredLoop(MeasuredBase):
             in [rig]. An assumed gain error only widens the errors of fitted parameters.
         first_harmonic_errs: True if the model error includes the first harmonic of the force.
 
+        shared_cache: histories of the motion and positions of the rows in them, which copies of the loop share.
+
     Notes:
         The model error is independent between harmonics h, and beyond the fifth proportional to 1/h.
     """
 
-    prepared: PreparedLoop
+    test: Loop
+    frequency: Array
+    cycles: float
+    from_rest: bool
+    phase: Array
+    measured_force: Array
+    noise: float
+    coefficients: Array
+    half_range: float
+    datum: float | None = None
+    record_notes: tuple[str, ...] = ()
+    faulty_rows: Mapping[str, OutlierRows] = field(default_factory=dict)
+    first_row: int = 0
+    row_noise: RowNoise = field(default_factory=RowNoise)
     fundamental_only: bool = False
     gain_error: float = 0.0
     gain_weighs: bool = False
     first_harmonic_errs: bool = True
+    shared_cache: dict[Hashable, Any] = field(default_factory=dict, repr=False)
     kind = "loop"
     components = ("force",)
 
     @property
-    def test(self) -> Loop:
-        """Measured loop as read from the file, reduced to its steady cycles."""
-        return self.prepared.loop
-
-    @property
     def notes(self) -> Sequence[str]:
         """Sentences for the user: left-out parts of the record, a preload, or a contradiction between loops."""
-        return [*self.prepared.notes, *([self.contradiction] if self.contradiction else [])]
+        return [*self.record_notes, *([self.contradiction] if self.contradiction else [])]
 
     @property
     def temperature(self) -> float:
@@ -69,14 +100,9 @@ class MeasuredLoop(MeasuredBase):
         return self.test.temperature or np.nan
 
     @property
-    def frequency(self) -> Array:
-        """Frequency [Hz] of the only operating point of a loop, (1,), or of each point of a sweep, (n,)."""
-        return np.array([self.prepared.frequency])
-
-    @property
     def amplitude(self) -> Array:
         """Zero-to-peak amplitude [m or rad] of the only point of a loop, (1,), or of all sweep points, (n,)."""
-        return np.array([self.prepared.amplitude])
+        return self.history(is_transient=False).amplitude
 
     @property
     def conditions(self) -> RubberConditions:
@@ -86,38 +112,82 @@ class MeasuredLoop(MeasuredBase):
     @cached_property
     def measured(self) -> Array:
         """Complex stiffness of the loop's first harmonic [N/m or N m/rad], (1,); of a sweep, of each point, (n,)."""
-        return np.array([self.prepared.first_harmonic])
+        root = np.sqrt(self.weights)
+        _, force = as_complex(least_squares(basis(self.phase, 1) * root[:, None], self.measured_force * root))
+        return np.array([force / self.coefficients[1]])
+
+    @property
+    def has_predecessor(self) -> bool:
+        """True if the record has earlier rows before the loop; the rubber remembers their deformation."""
+        return self.test.part is not None and self.test.part.first_row > 0
+
+    def history(self, is_transient: bool) -> History:
+        """Displacement without noise that drives the model: one settled cycle of 1024 samples, or the whole record.
+
+        The whole record if it begins at rest, and if `is_transient` (the response of the model changes over the first
+        cycles of a settled motion), unless other cycles precede the loop.
+        """
+        is_whole = is_transient and not (self.from_rest or self.has_predecessor)
+        extent = self.from_rest, is_whole
+        if extent not in self.shared_cache:
+            frequency = float(self.frequency[0])
+            motion = np.fft.irfft(0.5 * GRID * np.append(0.0, self.coefficients[1:]), GRID)
+            if self.from_rest:
+                motion = np.resize(motion - motion[0], int(np.ceil(self.cycles * GRID)) + 2)
+                history = History(motion, 1.0 / (frequency * GRID), periodic=False, frequency=frequency)
+            else:
+                half_row = 0.5 * self.cycles / self.test.time.size
+                count = int(np.ceil(self.cycles - half_row)) if is_whole else 1
+                history = History.steady(np.tile(motion, count), frequency, cycles=count)
+            self.shared_cache[extent] = replace(history, accuracy=_ACCURACY)
+        return self.shared_cache[extent]
+
+    def interpolate_at_rows(self, response: Array) -> Array:
+        """Interpolate a model response at the samples of `history`, (..., samples), to the measured rows, (..., n).
+
+        The mean is subtracted if the fit uses the loop about its mean (`datum`).
+        """
+        length = response.shape[-1]
+        if self.datum is not None and not self.from_rest:
+            response = response - response.mean(axis=-1, keepdims=True)
+        if length not in self.shared_cache:
+            position = self.phase * GRID
+            index = position.astype(np.intp)
+            ahead = np.minimum(index + 1, length - 1) if self.from_rest else (index + 1) % length
+            self.shared_cache[length] = index % length, ahead, position - index
+        index, ahead, part = self.shared_cache[length]
+        rows = response.take(index, axis=-1)
+        rows *= 1.0 - part
+        rows += response.take(ahead, axis=-1) * part
+        if self.datum is not None and self.from_rest:
+            rows = rows - np.average(rows, axis=-1, weights=self.weights)[..., None]
+        return rows
 
     @property
     def size(self) -> int:
         """Number of residuals of the test: rows or bins of a loop, two for each point of a sweep."""
-        return 2 if self.fundamental_only else int(self.prepared.force.size)
+        return 2 if self.fundamental_only else int(self.measured_force.size)
 
     @cached_property
     def residual_count(self) -> int:
         """Number of residuals with weight, for degrees of freedom; if the noise is correlated, the effective number."""
         if self.fundamental_only:
             return 2
-        return round(self.prepared.row_noise.observed_share * np.count_nonzero(self._usable_rows))
+        return round(self.row_noise.observed_share * np.count_nonzero(self._usable_rows))
 
     @property
     def independent_count(self) -> float:
         """Number of independent residuals, which sets the uncertainty of a mean over the test."""
-        return self.residual_count / (1.0 if self.fundamental_only else self.prepared.row_noise.rows_as_one)
-
-    @property
-    def weights(self) -> Array:
-        """Weight of each row, (n,): 1 full, 0 left out; for a long loop, the number of rows averaged in each bin."""
-        return self.prepared.weight
+        return self.residual_count / (1.0 if self.fundamental_only else self.row_noise.rows_as_one)
 
     @property
     def relative_noise(self) -> float:
         """Standard deviation of a row's noise relative to half the force range, or of a sweep point relative to |K|."""
-        return self.prepared.noise / self.prepared.half_range
+        return self.noise / self.half_range
 
     def weighted(self, weight: Array) -> Self:
         """Return the test with the weight of each of its n points multiplied by a factor, (n,)."""
-        return replace(self, prepared=replace(self.prepared, weight=self.prepared.weight * weight))
+        return replace(self, weights=self.weights * weight)
 
     def fundamental(self) -> Self:
         """Return the loop compared by the first harmonic of its force only."""
@@ -130,51 +200,46 @@ class MeasuredLoop(MeasuredBase):
     def noise_free(self, model: Model) -> Self:
         """Return the test with the response of a model in place of the measured response."""
         force = self.force(model)
-        return replace(self, prepared=replace(self.prepared, force=force, half_range=float(np.ptp(force)) / 2.0))
+        return replace(self, measured_force=force, half_range=float(np.ptp(force)) / 2.0)
 
     def force(self, model: Model, values: Values | None = None) -> Array:
         """Model force at the n rows [N or N m], (..., n); `values` replace parameters of the model, (...) or scalar."""
         if values is None and (force := self._recall("force", model)) is not None:
             return force
-        history = self.prepared.history(model.is_transient)
+        history = self.history(model.is_transient)
         force = model.force(self.direction, history, kind="loop", values=values, conditions=self.test_conditions)
-        force = self.prepared.interpolate_at_rows(force) + (self.prepared.datum or 0.0)
+        force = self.interpolate_at_rows(force) + (self.datum or 0.0)
         return force if values is not None else self._keep("force", model, (), force)
 
     def residual(self, model: Model, values: Values | None = None) -> Array:
         """Whitened residuals: model minus measured force in units of noise, (..., size); see `MeasuredBase`."""
-        return self.whiten((self.force(model, values) - self.prepared.force) * self._per_noise)
+        return self.whiten((self.force(model, values) - self.measured_force) * self._per_noise)
 
     def jacobian(self, model: Model, names: Sequence[str]) -> Array:
-        """Derivatives of the whitened residuals with respect to parameter values [SI]; the last result is cached.
-
-        Returns:
-            Derivatives, (len(names), size).
-        """
+        """Derivatives of the whitened residuals with respect to parameter values [SI], (len(names), size); cached."""
         if (rows := self._recall("jacobian", model, tuple(names))) is not None:
             return rows
-        history = self.prepared.history(model.is_transient)
+        history = self.history(model.is_transient)
         force, slopes = force_and_slopes(model, self.direction, history, names, self.test_conditions)
-        self._keep("force", model, (), self.prepared.interpolate_at_rows(force) + (self.prepared.datum or 0.0))
-        rows = self.whiten(self.prepared.interpolate_at_rows(slopes) * self._per_noise)
+        self._keep("force", model, (), self.interpolate_at_rows(force) + (self.datum or 0.0))
+        rows = self.whiten(self.interpolate_at_rows(slopes) * self._per_noise)
         return self._keep("jacobian", model, tuple(names), rows)
 
     def residual_change(self, change: Array, model: Model, added: Array | float = 0.0) -> Array:
         """Change of the whitened residuals, (..., size), due to a small change of the model's stiffness.
 
         Args:
-            change: change of the stiffness at each operating point (one in a loop, in the first harmonic of its force),
-                complex, (..., 1) [N/m or N m/rad].
-            model: model whose stiffness changes.
-            added: stiffness that is added to the model at the same points, complex [N/m or N m/rad]; a loop ignores it.
+            change: change of the stiffness in the first harmonic of the force, complex, (..., 1) [N/m or N m/rad].
+            model: not used for a loop.
+            added: not used for a loop.
         """
-        wave = self.prepared.coefficients[1] * np.exp(2j * np.pi * self.prepared.phase)
+        wave = self.coefficients[1] * np.exp(2j * np.pi * self.phase)
         per_unit = self.whiten(np.array([wave.real, -wave.imag]) * self._per_noise)
         return np.concatenate((change.real, change.imag), axis=-1) @ per_unit
 
     def relative_difference(self, model: Model) -> Array:
         """Model minus measured force at each row, relative to half the measured force range, (1, n)."""
-        return ((self.force(model) - self.prepared.force) / self.prepared.half_range)[None]
+        return ((self.force(model) - self.measured_force) / self.half_range)[None]
 
     def relative(self, model: Model) -> Array:
         """Magnitude of the relative difference at each row, less its mean (the zero of a load cell is unknown)."""
@@ -183,7 +248,7 @@ class MeasuredLoop(MeasuredBase):
 
     def misfit(self, model: Model) -> Array:
         """Model minus measured force at each row, in units of the row's noise, (n,); 0 at rows without weight."""
-        return (self.force(model) - self.prepared.force) * self._per_noise
+        return (self.force(model) - self.measured_force) * self._per_noise
 
     def distance(self, model: Model) -> Array:
         """Absolute difference between model and measured force at each row, in units of noise, (n,)."""
@@ -191,23 +256,18 @@ class MeasuredLoop(MeasuredBase):
 
     def displayed_residual(self, model: Model) -> Array:
         """Residuals for charts, model minus measured in units of noise, (size,): also of points without weight."""
-        distance = (self.force(model) - self.prepared.force) / self.prepared.noise
+        distance = (self.force(model) - self.measured_force) / self.noise
         return np.where(self.weights > 0.0, self.misfit(model), distance)
 
     def outlier_indices(self, model: Model) -> Array:
         """Indices of the rows whose force is far from the harmonics fitted to the loop, (k,); the model is not used."""
-        return self.prepared.outliers["force"].rows
+        return self.faulty_rows["force"].rows
 
     def outliers(self, points: Array, model: Model) -> Iterator[Outlier]:
-        """Yield all rows of the loop that are far from its harmonics, with the distance in units of noise.
-
-        Args:
-            points: not used for a loop.
-            model: not used for a loop.
-        """
+        """Yield all rows that are far from the loop's harmonics, with the distance [noise]; no argument is used."""
         file = str(self.source.file) if self.source else None
-        before = self.prepared.first_row + (self.test.part.first_row if self.test.part else 0)
-        for column, (rows, distance) in self.prepared.outliers.items():
+        before = self.first_row + (self.test.part.first_row if self.test.part else 0)
+        for column, (rows, distance) in self.faulty_rows.items():
             for row, noise_units in zip(rows.tolist(), distance.tolist(), strict=True):
                 yield Outlier(self.name, file, row + before + 1, column, noise_units)
 
@@ -217,7 +277,7 @@ class MeasuredLoop(MeasuredBase):
         These are a constant, and the columns of `basis` for five harmonics; with `fundamental_only` only the first
         harmonic is not 0.
         """
-        rows = self.force_changes(basis(self.prepared.phase, SMOOTH_HARMONICS).T)
+        rows = self.force_changes(basis(self.phase, SMOOTH_HARMONICS).T)
         if self.fundamental_only:
             rows[np.delete(np.arange(len(rows)), [1, SMOOTH_HARMONICS + 1])] = 0.0
         return rows
@@ -229,47 +289,44 @@ class MeasuredLoop(MeasuredBase):
     @cached_property
     def _usable_rows(self) -> Array:
         """Mask of the whitened rows that have weight and whose noise depends only on rows with weight, (n,)."""
-        return self.prepared.row_noise.usable_rows(self.prepared.weight)
+        return self.row_noise.usable_rows(self.weights)
 
     @cached_property
     def _per_noise(self) -> Array:
         """Reciprocal of the standard deviation of each row's force [1/N or 1/(N m)], (n,); 0 for unused rows."""
-        return np.sqrt(self.prepared.weight) / (self.prepared.noise * self.prepared.row_noise.row_scale)
+        return np.sqrt(self.weights) / (self.noise * self.row_noise.row_scale)
 
     def _whiten_rows(self, rows: Array) -> Array:
         """Remove the autocorrelation of the noise from rows of force in units of noise, (..., n); unused rows become 0.
 
         If only the first harmonic is used, the result is the two components along the first harmonic, (..., 2).
         """
-        white = self.prepared.row_noise.whiten(rows)
+        white = self.row_noise.whiten(rows)
         white *= self._usable_rows
         return white @ self._fundamental if self.fundamental_only else white
 
     def force_changes(self, waves: Array) -> Array:
         """Changes of the whitened residuals, (c, size), due to force changes relative to half the range, (c, n)."""
-        return self.whiten(waves * (self._per_noise * self.prepared.half_range))
+        return self.whiten(waves * (self._per_noise * self.half_range))
 
     def whiten(self, difference: Array) -> Array:
-        """Remove the correlation of the noise of rows, and the errors that rows share.
-
-        Args:
-            difference: changes of the force at the rows, in units of noise, (..., n).
+        """Whiten changes of the force at the rows in units of noise, (..., n): unit variance, no correlation.
 
         Returns:
-            Whitened residuals, (..., size), whose noise is independent with unit variance.
+            Whitened residuals, (..., size), without the correlation of neighbouring rows and the errors they share.
         """
         return self.shared_errors.whiten(self._whiten_rows(difference))
 
     @cached_property
     def _fundamental(self) -> Array:
         """Orthonormal basis of the whitened rows of a first harmonic, (n, 2)."""
-        waves = self.prepared.row_noise.whiten(basis(self.prepared.phase, 1).T[1:] * self._per_noise)
+        waves = self.row_noise.whiten(basis(self.phase, 1).T[1:] * self._per_noise)
         return np.linalg.qr((waves * self._usable_rows).T)[0]
 
     @cached_property
     def _unit_offset(self) -> Array:
         """Change of the whitened rows if half the force range is added to the force of every row, (size,)."""
-        return self._whiten_rows(self._per_noise * self.prepared.half_range)
+        return self._whiten_rows(self._per_noise * self.half_range)
 
     @cached_property
     def _unit_gain(self) -> Array:
@@ -279,8 +336,8 @@ class MeasuredLoop(MeasuredBase):
         the model towards small forces (Peelle's puzzle: R. Fruehwirth, D. Neudecker, H. Leeb, EPJ Web of Conferences
         27 (2012) 00008).
         """
-        waves, weighed = basis(self.prepared.phase, SMOOTH_HARMONICS), self.weights > 0.0
-        smooth = waves @ np.linalg.lstsq(waves[weighed], self.prepared.force[weighed], rcond=None)[0]
+        waves, weighed = basis(self.phase, SMOOTH_HARMONICS), self.weights > 0.0
+        smooth = waves @ np.linalg.lstsq(waves[weighed], self.measured_force[weighed], rcond=None)[0]
         return self._whiten_rows(smooth * self._per_noise)
 
     @cached_property
@@ -302,13 +359,13 @@ class MeasuredLoop(MeasuredBase):
         The errors are the cosine and sine of each harmonic and an offset; for a loop from rest, also a deviation of the
         first cycle and a drift.
         """
-        count, phase = 1 if self.fundamental_only else _ERROR_HARMONICS, self.prepared.phase
+        count, phase = 1 if self.fundamental_only else _ERROR_HARMONICS, self.phase
         waves = basis(phase, count).T[1:] * np.tile(_ERROR_SIZES[:count], 2)[:, None]
-        if self.prepared.from_rest and not self.fundamental_only:  # the first cycle has its error and a drift
-            order = np.arange(2.0 * np.ceil(self.prepared.cycles))[:, None]
-            drift = np.cos(np.pi * order * phase / self.prepared.cycles) / (1.0 + order)
+        if self.from_rest and not self.fundamental_only:  # the first cycle has its error and a drift
+            order = np.arange(2.0 * np.ceil(self.cycles))[:, None]
+            drift = np.cos(np.pi * order * phase / self.cycles) / (1.0 + order)
             waves = np.concatenate((waves, waves * (phase < 1.0), drift))
-        rows = self._whiten_rows(waves * (self._per_noise * self.prepared.half_range))
+        rows = self._whiten_rows(waves * (self._per_noise * self.half_range))
         if not self.first_harmonic_errs:
             rows[[0, count]] = 0.0
         return SharedErrors.from_columns(np.concatenate((rows, _ERROR_SIZES[:1, None] * self._unit_offset)))
@@ -316,8 +373,7 @@ class MeasuredLoop(MeasuredBase):
     def noise_sensitivity(self, influence: Array) -> dict[Hashable, Array]:
         """Sensitivity of k parameter estimates to errors of each noise variance that was itself estimated.
 
-        Args:
-            influence: change of each estimate per unit of each whitened residual, (k, size).
+        `influence`: change of each estimate per unit of each whitened residual, (k, size).
 
         Returns:
             By identifier of the variance, (k, size): the influence times the whitened derivative of the residuals'
@@ -325,11 +381,11 @@ class MeasuredLoop(MeasuredBase):
         """
         reaction = self.shared_errors.whiten(influence)
         whole = reaction @ self._fundamental.T if self.fundamental_only else reaction
-        parts = self.prepared.row_noise.noise_sensitivity(whole)
+        parts = self.row_noise.noise_sensitivity(whole)
         if self.fundamental_only:
             parts = [part @ self._fundamental for part in parts]
         if not parts and self.test.noise is None:
-            rows = round(self.prepared.row_noise.observed_share * np.count_nonzero(self._usable_rows))
+            rows = round(self.row_noise.observed_share * np.count_nonzero(self._usable_rows))
             parts = [np.sqrt(2.0 / rows) * reaction]
         return {(self.name, index): self.shared_errors.whiten(part) for index, part in enumerate(parts)}
 
@@ -339,6 +395,6 @@ class MeasuredLoop(MeasuredBase):
         The gain error is added. The model error of the first harmonic is subtracted, because a smooth error of the
         model includes it. `influence`: change of each estimate per unit of each whitened residual, (k, size).
         """
-        first = self.model_error * _ERROR_SIZES[0] * self.force_changes(basis(self.prepared.phase, 1).T[1:])
+        first = self.model_error * _ERROR_SIZES[0] * self.force_changes(basis(self.phase, 1).T[1:])
         both = influence @ np.vstack((first, self.gain_error * self.gain_and_offset()[0])).T
         return np.asarray(both * (-1.0, -1.0, 1.0) @ both.T)

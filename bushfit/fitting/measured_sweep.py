@@ -29,7 +29,7 @@ _FEW_SIZES, _COARSE = 0.4, 0.01
 _DIGITS = 9
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class MeasuredSweep(MeasuredBase):
     """Measured sweep: dynamic stiffness at n points, with residuals in gain and phase.
 
@@ -38,10 +38,10 @@ class MeasuredSweep(MeasuredBase):
     imaginary part.
 
     Args:
-        sweep: measured data.
+        test: measured data.
         noise: noise of the campaign's sweeps.
         residuals: definition of the residuals: "complex", or magnitude and loss factor.
-        weight: weight of each point, 0 to 1, (n,) in `order`; None for full weight.
+        weights: weight of each point, 0 to 1, (n,) in `order`, or (1,) for all points alike.
         part: indices of the rows of the sweep that are used, (n,) in `order`; None for all rows.
         order: index of the row of each of the n used points in the sweep, (n,).
         frequency, amplitude, measured: frequency [Hz], zero-to-peak amplitude [m or rad] and complex stiffness [N/m or
@@ -52,10 +52,10 @@ class MeasuredSweep(MeasuredBase):
         repeat: number of the repeat of each point, (n,).
     """
 
-    sweep: Sweep
+    test: Sweep
     noise: SweepNoise
     residuals: Residuals = "complex"
-    weight: Array | None = None
+    weights: Array = field(default_factory=lambda: np.ones(1))
     part: Array | None = None
     order: Array = field(init=False, repr=False)
     frequency: Array = field(init=False, repr=False)
@@ -68,18 +68,14 @@ class MeasuredSweep(MeasuredBase):
     components = ("storage", "loss")
 
     def __post_init__(self) -> None:
-        sweep = self.sweep
+        sweep = self.test
         order = np.lexsort((sweep.step, sweep.repeat, sweep.held_value)) if self.part is None else self.part
         arrays = sweep.frequency, sweep.amplitude, sweep.held_value, sweep.step, sweep.repeat, sweep.stiffness
         names = "frequency", "amplitude", "held_value", "step", "repeat", "measured"
         for name, array in zip(names, arrays, strict=True):
             object.__setattr__(self, name, array[order])
         object.__setattr__(self, "order", order)
-
-    @property
-    def test(self) -> Sweep:
-        """Measured sweep as read from the file."""
-        return self.sweep
+        object.__setattr__(self, "weights", np.broadcast_to(self.weights, order.shape))
 
     @cached_property
     def notes(self) -> list[str]:
@@ -105,8 +101,8 @@ class MeasuredSweep(MeasuredBase):
     @property
     def temperature(self) -> Array:
         """Temperature of the rubber at each point of the sweep [K], (n,); nan if unknown."""
-        kelvin = np.nan if self.sweep.temperature is None else self.sweep.temperature
-        return np.broadcast_to(kelvin, self.sweep.frequency.size)[self.order]
+        kelvin = np.nan if self.test.temperature is None else self.test.temperature
+        return np.broadcast_to(kelvin, self.test.frequency.size)[self.order]
 
     @property
     def size(self) -> int:
@@ -128,14 +124,9 @@ class MeasuredSweep(MeasuredBase):
         """Standard deviation of a point relative to |K|: root mean square over gain and phase of all lines."""
         return float(np.sqrt(np.mean(np.square(list(self.noise.random.values())))))
 
-    @cached_property
-    def weights(self) -> Array:
-        """Weight of each point, 0 (left out) to 1, (n,)."""
-        return np.ones(self.frequency.size) if self.weight is None else self.weight
-
     def weighted(self, weight: Array) -> Self:
         """Return the sweep with the weight of each of its n points multiplied by a factor, (n,)."""
-        return replace(self, weight=self.weights * weight)
+        return replace(self, weights=self.weights * weight)
 
     def without(self, points: Array) -> Self:
         """Return the sweep with weight 0 at the points with the given indices."""
@@ -143,7 +134,7 @@ class MeasuredSweep(MeasuredBase):
 
     def select(self, points: Array) -> Self:
         """Return the sweep with only the points for which the mask `points`, (n,), is True."""
-        return replace(self, weight=self.weights[points], part=self.order[points])
+        return replace(self, weights=self.weights[points], part=self.order[points])
 
     def with_weight(self) -> Self:
         """Return the sweep with only those points that have weight."""
@@ -152,9 +143,9 @@ class MeasuredSweep(MeasuredBase):
 
     def noise_free(self, model: Model) -> Self:
         """Return the sweep with the stiffness of a model in place of the measured stiffness."""
-        stiffness = self.sweep.stiffness.copy()
+        stiffness = self.test.stiffness.copy()
         stiffness[self.order] = self.stiffness(model)
-        return replace(self, sweep=replace(self.sweep, stiffness=stiffness))
+        return replace(self, test=replace(self.test, stiffness=stiffness))
 
     @cached_property
     def conditions(self) -> RubberConditions:
@@ -175,7 +166,7 @@ class MeasuredSweep(MeasuredBase):
             Frequency [Hz] and reached amplitude [m or rad] of the d distinct points, (2, d); and, for each of the n
             points of the sweep, the index of its distinct point, (n,).
         """
-        points = self.frequency + 1j * self.sweep.amplitude_reached[self.order]
+        points = self.frequency + 1j * self.test.amplitude_reached[self.order]
         distinct, distinct_index = np.unique(points, return_inverse=True)
         return distinct.real, distinct.imag, distinct_index
 
@@ -187,7 +178,7 @@ class MeasuredSweep(MeasuredBase):
             the model depends on temperature or earlier strains; and the index among them of each point of the sweep.
         """
         if model.depends_on:
-            reached = self.sweep.amplitude_reached[self.order]
+            reached = self.test.amplitude_reached[self.order]
             return self.frequency, reached, self.conditions, slice(None)
         frequency, amplitude, distinct_index = self._distinct
         return frequency, amplitude, UNKNOWN, distinct_index
@@ -271,8 +262,8 @@ class MeasuredSweep(MeasuredBase):
     def covariance(self) -> Whitening:
         """Covariance of the noise of the n log gains and n phases [rad], by which the residuals are whitened."""
         random = self.noise.scatter(self.name, self.held_value, self.step)
-        if self.sweep.relative_error is not None and self.sweep.noise is None:
-            random = np.maximum(np.tile(self.sweep.relative_error[self.order], (2, 1)), FLOOR)
+        if self.test.relative_error is not None and self.test.noise is None:
+            random = np.maximum(np.tile(self.test.relative_error[self.order], (2, 1)), FLOOR)
         run = np.repeat(np.arange(self.block_starts.size), np.diff(self.block_starts, append=self.order.size))
         line = np.unique(self.held_value, return_inverse=True)[1]
         return Whitening(run, line, random, self.noise, self.weights)

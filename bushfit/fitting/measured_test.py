@@ -27,6 +27,9 @@ class MeasuredBase(ABC):
     Args:
         kind: "loop" or "sweep".
         components: names of the residuals of a point: "force", or "storage" and "loss".
+        test: measured data as read from the file.
+        weights: weight of each point, (n,): 1 full, 0 left out; for a long loop, the number of rows averaged in the
+            point.
         test_conditions: temperature and earlier strains of the rubber: one number each for a loop, one for each row of
             a sweep's file.
         model_error: standard deviation of the model's error, added to the noise, relative to |K| in phase and in
@@ -36,19 +39,11 @@ class MeasuredBase(ABC):
 
     kind: ClassVar[Kind]
     components: ClassVar[tuple[str, ...]]
+    test: Loop | Sweep
+    weights: Array
     test_conditions: RubberConditions = UNKNOWN
     model_error: float = 0.0
     contradiction: str | None = None
-
-    @property
-    @abstractmethod
-    def test(self) -> Loop | Sweep:
-        """Measured data as read from the file."""
-
-    @property
-    @abstractmethod
-    def weights(self) -> Array:
-        """Weight of each point, (n,): 1 full, 0 left out; for a long loop, the number of rows averaged in the point."""
 
     @abstractmethod
     def relative_difference(self, model: Model) -> Array:

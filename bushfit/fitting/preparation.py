@@ -13,7 +13,7 @@ from bushfit.fitting.measured_loop import MeasuredLoop
 from bushfit.fitting.measured_sweep import MeasuredSweep
 from bushfit.fitting.noise import SweepNoise, sweep_noise
 from bushfit.fitting.outliers import contradictions
-from bushfit.fitting.prepared_loop import PreparedLoop, prepare_loop
+from bushfit.fitting.prepare_loop import prepare_loop
 from bushfit.fitting.rig_class import class_errors
 from bushfit.geometry import Bushing, Place, unit_strain
 from bushfit.model.model import Model
@@ -45,8 +45,7 @@ def prepare_loops(
         rig: accuracy class of the rig (gain and phase errors).
         without_outliers: True to give weight 0 to rows whose force is an outlier.
     """
-    prepared_loops = [prepare_loop(loop, without_outliers=without_outliers) for loop in loops]
-    found = [MeasuredLoop(prepared).weighted(np.array(prepared.loop.weight)) for prepared in prepared_loops]
+    found = [prepare_loop(loop, without_outliers=without_outliers).weighted(np.array(loop.weight)) for loop in loops]
     first = np.argmax(repeats_of(found), axis=1) if found else np.empty(0)
     return with_gain_errors(_with_contradictions(found, [first]), rig)
 
@@ -72,7 +71,7 @@ def with_gain_weighting(data_sets: Iterable[MeasuredTest], *, weigh: bool) -> li
 
 def repeats_of(loops: Sequence[MeasuredLoop]) -> Array:
     """Mask of the pairs of loops that are repeats (same direction, preload, amplitude and frequency), (n, n)."""
-    conditions = np.log([(loop.prepared.amplitude, loop.prepared.frequency) for loop in loops]).reshape(-1, 2)
+    conditions = np.log([(*loop.amplitude, *loop.frequency) for loop in loops]).reshape(-1, 2)
     place = np.array([f"{loop.direction} {loop.test.preload}" for loop in loops])
     return np.all(np.abs(conditions[:, None] - conditions) <= SAME_LOOP, axis=-1) & (place[:, None] == place)
 
@@ -104,7 +103,10 @@ def prepare_sweeps(
     for sweep in sweeps:
         by_rig.setdefault(None if sweep.direction.axis else sweep.direction, []).append(sweep)
     noises = {id(sweep): noise for group in by_rig.values() for noise in [sweep_noise(group, rig)] for sweep in group}
-    found = [MeasuredSweep(sweep, noises[id(sweep)], residuals).weighted(np.array(sweep.weight)) for sweep in sweeps]
+    found = [
+        MeasuredSweep(test=sweep, noise=noises[id(sweep)], residuals=residuals, weights=np.array([sweep.weight]))
+        for sweep in sweeps
+    ]
     names = [f"{test.direction} {test.test.preload}" for test in found]
     places = [np.full(test.measured.size, names.index(name)) for test, name in zip(found, names, strict=True)]
     conditions = (places, [test.frequency for test in found], [test.amplitude for test in found])
@@ -209,20 +211,20 @@ def planned_loop(
     """
     phase, nil = cycles * np.arange(rows) / rows, np.zeros(rows)
     motion = amplitude * np.sin(2.0 * np.pi * phase)
-    silent = PreparedLoop(
-        loop=Loop("new", place, phase / frequency, motion, nil),
-        frequency=frequency,
+    silent = MeasuredLoop(
+        test=Loop("new", place, phase / frequency, motion, nil),
+        frequency=np.array([frequency]),
         cycles=cycles,
         from_rest=False,
         phase=phase,
-        force=nil,
-        weight=np.ones(rows),
+        measured_force=nil,
+        weights=np.ones(rows),
         noise=1.0,
         coefficients=np.array([0.0, -1j * amplitude]),
         half_range=1.0,
     )
-    loop = MeasuredLoop(silent).noise_free(model)
-    return replace(loop, prepared=replace(loop.prepared, noise=noise * loop.prepared.half_range))
+    loop = silent.noise_free(model)
+    return replace(loop, noise=noise * loop.half_range)
 
 
 def planned_sweep(
@@ -244,4 +246,5 @@ def planned_sweep(
         shared: standard deviations of the gain and phase errors [rad] shared by a run.
     """
     noise = SweepNoise({("new", float(x)): scatter for x in np.unique(amplitude)}, shared, "stated", 0)
-    return MeasuredSweep(Sweep("new", place, frequency, amplitude, model.stiffness(place, frequency, amplitude)), noise)
+    sweep = Sweep("new", place, frequency, amplitude, model.stiffness(place, frequency, amplitude))
+    return MeasuredSweep(test=sweep, noise=noise)

@@ -6,7 +6,8 @@ import numpy as np
 
 from bushfit.effects.mistakes import MISTAKES
 from bushfit.fitting.loop_cycles import waveform
-from bushfit.fitting.prepared_loop import TOLD_MEAN, PreparedLoop, prepare_loop, recorded_means
+from bushfit.fitting.measured_loop import MeasuredLoop
+from bushfit.fitting.prepare_loop import TOLD_MEAN, correlation_text, prepare_loop, recorded_means
 from bushfit.inspection.channels import EVEN_CLOCK, describe_sampling, odd_recording
 from bushfit.inspection.record import Findings, format_frequencies
 from bushfit.reading.measurement import Loop
@@ -54,34 +55,35 @@ def describe_loop(loop: Loop, labels: Labels) -> Findings:
     (length, to_length), half_force = units.displacement, float(np.ptp(loop.force)) / 2.0
     force, to_force = display_unit(*units.force, half_force)
     half_motion = float(np.ptp(loop.displacement)) / 2.0
-    amplitude, mean_motion, mean_force = prepared.amplitude, prepared.coefficients[0].real, float(prepared.force.mean())
+    frequency, amplitude = float(prepared.frequency[0]), float(prepared.amplitude[0])
+    mean_motion, mean_force = prepared.coefficients[0].real, float(prepared.measured_force.mean())
     noise = f"{number(100 * prepared.noise / half_force, 2)} % of half the {names[1]} range, per row"
     if prepared.noise > half_force:
         noise = "not known: the record is not a steady loop"
     facts = {
         "cycles": f"{prepared.cycles:.3g}, {'the first from rest' if prepared.from_rest else 'treated as steady'}",
-        "frequency": f"{prepared.frequency:.4g} Hz, {waveform(prepared.coefficients)}",
+        "frequency": f"{frequency:.4g} Hz, {waveform(prepared.coefficients)}",
         "sampling": f"{describe_sampling(loop)}, {loop.time.size / prepared.cycles:.4g} rows per cycle",
         "amplitude": f"{number(to_length * amplitude, 4)} {length} zero-to-peak",
         # down to the last digit of the amplitude: what lies below is noise
         f"mean {names[0]}": f"{format_aligned([to_length * amplitude, to_length * mean_motion], 4)[1]} {length}",
         f"mean {names[1]}": f"{format_aligned([to_force * half_force, to_force * mean_force], 4)[1]} {force}",
-        "noise": noise + prepared.correlation_text * (prepared.noise <= half_force),
+        "noise": noise + correlation_text(prepared) * (prepared.noise <= half_force),
     }
     if means := recorded_means(prepared):
         at_mean_force = amplitude * abs(mean_force) / half_force
         is_position = len(means) > 1 and abs(mean_motion) > _MOST_SOFTENING * at_mean_force
         facts["preload"] = means[-1 if is_position else 0].text(loop.direction)
-    odd = odd_recording(loop, labels, [prepared.frequency], [amplitude, half_motion], [half_force / amplitude])
+    odd = odd_recording(loop, labels, [frequency], [amplitude, half_motion], [half_force / amplitude])
     odd += odd_cycles(prepared)
     if prepared.cycles < 1.5 and abs(mean_motion) > 0.9 * half_motion:
         odd.append(
             f"one loading and unloading from {number(to_length * loop.displacement[0], 3)} {length}: a static curve is "
             "read as a loop about its mean; record three cycles or more, of which the first settle the rubber"
         )
-    if prepared.frequency * _LONGEST_CYCLE < 1.0:  # longer than any laboratory waits: what may the file say instead?
-        mistakes = [mistake.in_words(prepared.loop) for mistake in MISTAKES.values() if mistake.time < 1.0]
-        minutes = number(1.0 / prepared.frequency / 60.0, 2)
+    if frequency * _LONGEST_CYCLE < 1.0:  # longer than any laboratory waits: what may the file say instead?
+        mistakes = [mistake.in_words(prepared.test) for mistake in MISTAKES.values() if mistake.time < 1.0]
+        minutes = number(1.0 / frequency / 60.0, 2)
         odd.append(f"one cycle takes {minutes} min, which is unusual; possible causes: {', or '.join(mistakes)}")
     if _SMALLEST_OFFSET * half_motion < abs(mean_motion) <= TOLD_MEAN * amplitude and prepared.datum is not None:
         odd.append(
@@ -137,10 +139,10 @@ def describe_programme(record: Loop, loops: Sequence[Loop], labels: Labels) -> F
     """
     prepared_loops = [prepare_loop(loop) for loop in loops]
     unit, factor = record.direction.display.displacement
-    amplitudes = [prepared.amplitude for prepared in prepared_loops]
-    frequencies = [prepared.frequency for prepared in prepared_loops]
+    amplitudes = [float(prepared.amplitude[0]) for prepared in prepared_loops]
+    frequencies = [float(prepared.frequency[0]) for prepared in prepared_loops]
     cycles = [prepared.cycles for prepared in prepared_loops]
-    left_out = 1 - sum(prepared.loop.displacement.size for prepared in prepared_loops) / record.displacement.size
+    left_out = 1 - sum(prepared.test.displacement.size for prepared in prepared_loops) / record.displacement.size
     sizes, rates, ends = (
         list(dict.fromkeys(f"{value:.3g}" for value in values))
         for values in ([factor * size for size in amplitudes], frequencies, (min(cycles), max(cycles)))
@@ -149,26 +151,26 @@ def describe_programme(record: Loop, loops: Sequence[Loop], labels: Labels) -> F
         "programme": f"{len(loops)} loops in one record: {', '.join(sizes)} {unit} at {', '.join(rates)} Hz, "
         f"{' to '.join(ends)} cycles used of each; {100 * left_out:.2g} % of the rows left out"
     }
-    stiffness = [prepared.half_range / prepared.amplitude for prepared in prepared_loops]
+    stiffness = [float(prepared.half_range / prepared.amplitude[0]) for prepared in prepared_loops]
     odd = odd_recording(record, labels, frequencies, amplitudes, stiffness)
     for place, (loop, prepared) in enumerate(zip(loops, prepared_loops, strict=True), start=1):
         rest = loop.part.left_out if loop.part else None
-        size, course = number(factor * prepared.amplitude, 4), waveform(prepared.coefficients)
+        size, course = number(factor * float(prepared.amplitude[0]), 4), waveform(prepared.coefficients)
         percent = number(100 * prepared.noise / prepared.half_range, 2)
-        noise = f"noise {percent} % of half the range, per row{prepared.correlation_text}"
-        words = f"{size} {unit} at {prepared.frequency:.4g} Hz, {course}", noise, rest
+        noise = f"noise {percent} % of half the range, per row{correlation_text(prepared)}"
+        words = f"{size} {unit} at {prepared.frequency[0]:.4g} Hz, {course}", noise, rest
         facts[f"loop {place}"] = "; ".join(filter(None, words))
         odd += [f"loop {place}: {note}" for note in odd_cycles(prepared) if note != rest]
     facts["sampling"] = describe_sampling(record)
     return facts, odd
 
 
-def odd_cycles(prepared: PreparedLoop) -> list[str]:
+def odd_cycles(prepared: MeasuredLoop) -> list[str]:
     """List the notes on a loop, changes from cycle to cycle, and a ripple on its motion."""
-    return [*prepared.notes, *changing_cycles(prepared), *ripple(prepared)]
+    return [*prepared.record_notes, *changing_cycles(prepared), *ripple(prepared)]
 
 
-def changing_cycles(prepared: PreparedLoop) -> Iterator[str]:
+def changing_cycles(prepared: MeasuredLoop) -> Iterator[str]:
     """Warn of a force amplitude, mean force or mean motion that changes from the first to the last cycles of a loop.
 
     Loops of one cycle, or with too few rows in a cycle, are not checked.
@@ -176,10 +178,10 @@ def changing_cycles(prepared: PreparedLoop) -> Iterator[str]:
     Returns:
         One sentence for each change beyond chance.
     """
-    loop, count = prepared.loop, int(prepared.cycles + 0.01)
+    loop, count = prepared.test, int(prepared.cycles + 0.01)
     phase = (loop.time - loop.time[0]) * prepared.frequency
     numbers = sorted({*range(min(count, _MOST_END_CYCLES)), *range(max(count - _MOST_END_CYCLES, 0), count)})
-    outliers = prepared.outliers["force"].rows
+    outliers = prepared.faulty_rows["force"].rows
     parts = [np.setdiff1d(np.flatnonzero((phase >= n) & (phase < n + 1)), outliers) for n in numbers]
     rows = min((part.size for part in parts), default=0)
     order = resolved_order(rows, 7)  # a loop of rubber has next to nothing beyond
@@ -207,7 +209,7 @@ def changing_cycles(prepared: PreparedLoop) -> Iterator[str]:
         )
     # a time that was made from the motion turns its noise into drift
     smallest_drift = (
-        2.0 * _SMALLEST_CHANGE * prepared.amplitude if loop.has_recorded_time else noise_threshold(loop.displacement)
+        2.0 * _SMALLEST_CHANGE * prepared.amplitude[0] if loop.has_recorded_time else noise_threshold(loop.displacement)
     )
     limits = max(_REAL_CHANGE * 1.5 * error, smallest), smallest_drift
     for name, unit, mean, limit in zip(
@@ -218,7 +220,7 @@ def changing_cycles(prepared: PreparedLoop) -> Iterator[str]:
             yield f"the {name} drifts: its mean goes from {first} to {last} {unit.name}"
 
 
-def ripple(prepared: PreparedLoop) -> Iterator[str]:
+def ripple(prepared: MeasuredLoop) -> Iterator[str]:
     """Warn of a fast sine superposed on the motion of a loop: mains hum, servo oscillation or sensor noise.
 
     Returns:
@@ -228,7 +230,7 @@ def ripple(prepared: PreparedLoop) -> Iterator[str]:
         The slow harmonics are subtracted from the motion; the ripple is the largest line in the spectrum of the
         remainder, with a Hann window. White noise makes lines up to about five times the median.
     """
-    loop, steps = prepared.loop, np.diff(prepared.loop.time)
+    loop, steps = prepared.test, np.diff(prepared.test.time)
     is_even = np.ptp(steps) <= 2.0 * EVEN_CLOCK * np.median(steps)
     if not (loop.has_recorded_time and steps.size >= _FEWEST_RIPPLE_ROWS and is_even):
         return
@@ -236,18 +238,18 @@ def ripple(prepared: PreparedLoop) -> Iterator[str]:
     is_triangle = waveform(prepared.coefficients) == "a triangle"
     slow = prepared.coefficients if is_triangle else prepared.coefficients[: _RIPPLE_ORDER + 1]
     rest = loop.displacement - series(slow, phase)
-    rest[prepared.outliers["displacement"].rows] = 0.0
+    rest[prepared.faulty_rows["displacement"].rows] = 0.0
     window = np.hanning(rest.size)
     lines = np.abs(np.fft.rfft((rest - rest.mean()) * window)) * (2.0 / window.sum())
     frequency = np.fft.rfftfreq(rest.size, float(np.mean(steps)))
     lines[frequency < _RIPPLE_ORDER * prepared.frequency] = 0.0
     line = int(np.argmax(lines))
-    if lines[line] > max(_SMALLEST_RIPPLE * prepared.amplitude, _RIPPLE_LINE * float(np.median(lines))):
+    if lines[line] > max(_SMALLEST_RIPPLE * float(prepared.amplitude[0]), _RIPPLE_LINE * float(np.median(lines))):
         unit, factor = loop.direction.display.displacement
         is_mains = min(abs(frequency[line] % mains - offset) for mains in (50.0, 60.0) for offset in (0.0, mains)) < 1.0
         yield (
             f"a ripple of about {number(factor * lines[line], 2)} {unit} at {frequency[line]:.3g} Hz "
-            f"({number(100 * lines[line] / prepared.amplitude, 2)} % of the amplitude) is superposed on the motion: "
+            f"({number(100 * lines[line] / prepared.amplitude[0], 2)} % of the amplitude) is superposed on the motion: "
             f"{'mains hum' if is_mains else 'an oscillating controller, or play at the reversals'}? The slow motion is "
             "read as the loop"
         )

@@ -72,7 +72,7 @@ def describe_sweep(sweep: Sweep, labels: Labels) -> Findings:
         "noise": noise.describe(),
     }
     odd = [
-        *MeasuredSweep(sweep, noise).notes,
+        *MeasuredSweep(test=sweep, noise=noise).notes,
         *implausible_sizes(sweep.direction, sweep.frequency, sweep.amplitude, np.abs(sweep.stiffness)),
         *wrong_labels(labels, sweep.direction, levels.tolist(), frequencies.tolist()),
         *copied_rows(sweep, noise, points),

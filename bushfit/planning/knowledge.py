@@ -210,11 +210,11 @@ def estimate_noise(data: PreparedCampaign) -> Noise:
         gain, phase = np.sqrt(np.mean(np.square(list(noise.random.values())), axis=0)).tolist()
         estimate = replace(estimate, scatter=(gain, phase), shared=noise.shared)
     if loops:
-        rows = [loop.test.time.size / loop.prepared.cycles for loop in loops]
+        rows = [loop.test.time.size / loop.cycles for loop in loops]
         forces = [
             loop.relative_noise * np.sqrt(ROWS_PER_CYCLE / count) for loop, count in zip(loops, rows, strict=True)
         ]
-        as_one = float(np.mean([loop.prepared.row_noise.rows_as_one for loop in loops]))
+        as_one = float(np.mean([loop.row_noise.rows_as_one for loop in loops]))
         force = float(np.sqrt(np.mean(np.square(forces))))
         estimate = replace(estimate, force=force, rows_as_one=as_one)
     return estimate
@@ -228,11 +228,10 @@ def with_rig_class(rig: RigSettings, noise: Noise) -> RigSettings:
 def _campaign_runs(data: PreparedCampaign) -> Iterator[Test]:
     """Generate the runs of a campaign's loops and sweeps as tests of a plan; free oscillations are omitted."""
     for loop in data.loops:
-        yield SimulatedLoop(
-            loop.direction, loop.prepared.amplitude, loop.prepared.frequency, max(round(loop.prepared.cycles), 1)
-        )
+        amplitude, frequency = float(loop.amplitude[0]), float(loop.frequency[0])
+        yield SimulatedLoop(loop.direction, amplitude, frequency, max(round(loop.cycles), 1))
     for sweep in data.sweeps:
-        stepped = sweep.sweep.stepped
+        stepped = sweep.test.stepped
         for block in np.split(np.arange(sweep.frequency.size), sweep.block_starts[1:]) if stepped else ():
             steps = tuple(sweep.step[block].tolist())
             level = (float(sweep.held_value[block[0]]),)

@@ -42,7 +42,7 @@ def gap_table(diagnosis: Diagnosis) -> pd.DataFrame:
         else:
             responses = loops_table(diagnosis.result.model, [data_set])
             columns |= {name: responses[name] for name in ("time [s]", "frequency [Hz]")}
-            columns[f"amplitude [{unit}]"] = data_set.prepared.amplitude * factor
+            columns[f"amplitude [{unit}]"] = float(data_set.amplitude[0]) * factor
         for name, model, test in (("before", before.model, data_set), ("after", after.model, corrected)):
             in_noise = np.split(-test.misfit(model), test.residuals_per_point)
             percent = -100.0 * test.relative_difference(model)

@@ -21,6 +21,7 @@ from bushfit.prediction.resonance import PredictedResonance
 from bushfit.prediction.static_curve import StaticCurve
 from bushfit.prediction.stiffness import Prediction
 from bushfit.reading.measurement import loss_factor
+from bushfit.reduction.harmonics import series
 from bushfit.units import CELSIUS
 
 #: Display unit of amplitudes and its factor from SI, by SI unit: mm for m, % for strain.
@@ -230,23 +231,23 @@ def loops_table(model: Model, data_sets: Sequence[MeasuredLoop]) -> pd.DataFrame
     """
     tables = []
     for data_set in data_sets:
-        place, prepared = data_set.direction, data_set.prepared
+        place = data_set.direction
         (_, length), (_, factor), _ = place.display
         force = response_headers(place)[2]
-        binned = prepared.phase.size < data_set.test.force.size
-        outliers = np.empty(0) if binned else prepared.outliers["force"].rows
+        binned = data_set.phase.size < data_set.test.force.size
+        outliers = np.empty(0) if binned else data_set.faulty_rows["force"].rows
         tables.append(
             pd.DataFrame(
                 {
                     "loop": data_set.name,
                     "direction": str(place),
-                    "time [s]": prepared.phase / prepared.frequency,
-                    "frequency [Hz]": prepared.frequency,
-                    displacement_header(place): prepared.displacement(prepared.phase) * length,
-                    force: prepared.force * factor,
+                    "time [s]": data_set.phase / data_set.frequency,
+                    "frequency [Hz]": data_set.frequency[0],
+                    displacement_header(place): series(data_set.coefficients, data_set.phase) * length,
+                    force: data_set.measured_force * factor,
                     f"model {force}": data_set.force(model) * factor,
                     "residual [noise]": -data_set.displayed_residual(model),
-                    "outlier": np.where(np.isin(np.arange(prepared.phase.size), outliers), "yes", "no"),
+                    "outlier": np.where(np.isin(np.arange(data_set.phase.size), outliers), "yes", "no"),
                 }
             )
         )
@@ -273,7 +274,7 @@ def sweeps_table(model: Model, data_sets: Sequence[MeasuredSweep]) -> pd.DataFra
         tables.append(
             pd.DataFrame(
                 {
-                    "sweep": data_set.sweep.name,
+                    "sweep": data_set.name,
                     "direction": str(place),
                     **condition_columns(data_set),
                     "frequency [Hz]": data_set.frequency,
@@ -298,7 +299,7 @@ def condition_columns(data_set: MeasuredSweep) -> dict[str, Any]:
     Returns:
         Values by column header: one for all points of the sweep, or (n,).
     """
-    sweep, conditions = data_set.sweep, data_set.source.conditions if data_set.source else {}
+    sweep, conditions = data_set.test, data_set.source.conditions if data_set.source else {}
     columns: dict[str, Any] = {"stepped": sweep.stepped or "neither"}
     if sweep.temperature is not None:
         columns["temperature [degC]"] = data_set.temperature - CELSIUS

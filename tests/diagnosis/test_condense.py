@@ -65,10 +65,10 @@ def test_means_are_as_sharp_as_their_points():
     (sweep,), said = shorten_tests(data_of(swept(PAPER)))[0].sweeps, shorten_tests(data_of(swept(PAPER)))[1]
     assert said == ("swept: 5400 points are averaged to 600 narrow bands for the diagnosis",)
     expected = SCATTER / np.sqrt(POINTS / 100)
-    assert np.std(off(sweep.sweep).real) == pytest.approx(expected, rel=0.1)
+    assert np.std(off(sweep.test).real) == pytest.approx(expected, rel=0.1)
     assert sweep.relative_noise == pytest.approx(expected, rel=0.1)
-    assert abs(np.mean(off(sweep.sweep))) < 4.0 * expected / np.sqrt(600)
-    assert set(sweep.sweep.amplitude) == set(LEVELS)
+    assert abs(np.mean(off(sweep.test))) < 4.0 * expected / np.sqrt(600)
+    assert set(sweep.test.amplitude) == set(LEVELS)
 
 
 @pytest.mark.parametrize(
@@ -84,7 +84,7 @@ def test_means_are_as_sharp_as_their_points():
 def test_means_lie_on_the_curve(sweep, largest):
     """Evenly in frequency the first bands are wide in its logarithm; where neither is held, points at one frequency may
     have amplitudes far apart, and are taken in turn."""
-    made = shorten_tests(data_of(sweep))[0].sweeps[0].sweep
+    made = shorten_tests(data_of(sweep))[0].sweeps[0].test
     assert made.frequency.size < sweep.frequency.size
     assert np.abs(off(made)).max() < largest
     if sweep.stepped == "frequency":

@@ -141,7 +141,7 @@ def test_known_families_are_each_law_of_rate_with_each_of_amplitude(paper_model,
     found = known_families(paper_model, tests)
     assert len(found) == 4 * 6 - 1 - 1  # less the paper's own, and a second springpot on intrinsic time
     assert {"kraus", "maxwell", "fractional_zener+sliders", "second_springpot+coupled_breakdown"} < {*found}
-    warm = [replace(sweep, sweep=replace(sweep.sweep, temperature=290.0 + 9.0 * i)) for i, sweep in enumerate(tests)]
+    warm = [replace(sweep, test=replace(sweep.test, temperature=290.0 + 9.0 * i)) for i, sweep in enumerate(tests)]
     at_temperatures = known_families(paper_model, warm)
     assert at_temperatures == ("temperature", *(f"temperature+{name}" for name in found))
     kraus = paper_model.with_effect("kraus")

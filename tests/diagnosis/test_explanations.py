@@ -75,14 +75,14 @@ def test_the_compound_bends_a_loop_in_odd_overtones_and_in_the_first_cycle(bare)
     """In steady cycles the h-th overtone has 1/h^2 of the deviation of the stiffness, and no even one occurs."""
     loop = replace(split_by_kind(bare.data_sets)[0][0], gain_error=0.0)
     unit = np.abs(loop.smooth_changes()[1]).max()
-    rows, phase = compound_shapes(loop) / unit, loop.prepared.phase
+    rows, phase = compound_shapes(loop) / unit, loop.phase
     waves = np.exp(2j * np.pi * np.arange(15)[:, None] * phase)
     by_order = np.abs(rows @ waves.T) * 2.0 / phase.size
     odd = np.arange(3, 14, 2)
     expected = np.zeros((2, len(odd), 15))
     expected[:, np.arange(len(odd)), odd] = 1.0 / odd**2
     np.testing.assert_allclose(by_order.reshape(expected.shape), expected, atol=3e-3)
-    rested = compound_shapes(replace(loop, prepared=replace(loop.prepared, from_rest=True)))[len(rows) :] / unit
+    rested = compound_shapes(replace(loop, from_rest=True))[len(rows) :] / unit
     rested -= np.median(rested[:, phase >= 1.0], axis=1, keepdims=True)  # the zero of the load cell is uncertain
     assert len(rested) == 6
     assert np.median(np.abs(rested[:, phase >= 1.0])) < 1e-9

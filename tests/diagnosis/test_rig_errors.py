@@ -22,7 +22,7 @@ RUN, LEVEL = 0, 1
 def off(evidence: FitResult, sweep: MeasuredSweep, change: Callable[[MeasuredSweep], Array]) -> Array:
     """What a small relative change of the measured stiffness does to the residuals, per unit of it."""
     step = 1e-6
-    changed = replace(sweep, sweep=replace(sweep.sweep, stiffness=sweep.sweep.stiffness * (1.0 - step * change(sweep))))
+    changed = replace(sweep, test=replace(sweep.test, stiffness=sweep.test.stiffness * (1.0 - step * change(sweep))))
     row = np.zeros(evidence.residual.size)
     row[evidence.residual_rows[sweep]] = (changed.residual(evidence.model) - sweep.residual(evidence.model)) / step
     return row
@@ -33,7 +33,7 @@ def off(evidence: FitResult, sweep: MeasuredSweep, change: Callable[[MeasuredSwe
 def test_what_shares_an_error_moves_together(bare, unit, kind, repeats):
     """A column is what an error of the class makes of a run, or of all runs of a level, in gain or in phase."""
     sweep = split_by_kind(bare.data_sets)[1][1]
-    there = (sweep.sweep.amplitude == LEVELS[1]) & np.isin(sweep.sweep.repeat, repeats)
+    there = (sweep.test.amplitude == LEVELS[1]) & np.isin(sweep.test.repeat, repeats)
     wanted = off(bare, sweep, lambda _: unit * there) * (RIG.gain_error if unit == 1.0 else RIG.phase_error)
     every = [
         (block, column)

@@ -55,7 +55,7 @@ def spoiled(campaign: Campaign, off: Off) -> Campaign:
     """The axial tests of a campaign, their stiffness off; of a loop its first harmonic."""
     loops = list[Loop]()
     for data in PreparedCampaign.from_campaign(campaign).loops:
-        loop, prepared = data.test, data.prepared
+        loop, prepared = data.test, data
         both = basis(prepared.phase, 1).T[1:]
         first = both @ loop.force / np.sum(np.square(both), axis=1)
         share = complex(off(data.frequency, data.amplitude)[0])

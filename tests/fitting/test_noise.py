@@ -8,8 +8,7 @@ import pytest
 
 from bushfit.campaign.schema import RigSettings
 from bushfit.fitting.noise import SweepNoise, sweep_noise
-from bushfit.fitting.preparation import MeasuredLoop
-from bushfit.fitting.prepared_loop import prepare_loop
+from bushfit.fitting.prepare_loop import correlation_text, prepare_loop
 from bushfit.fitting.rig_class import ASSUMED
 from bushfit.fitting.row_noise import RowNoise, row_noise
 from bushfit.geometry import Direction
@@ -106,8 +105,8 @@ def low_passed(random: np.random.Generator, rows: int) -> np.ndarray:
 
 @pytest.mark.parametrize("correlation", [0.0, 0.9, 0.98])
 def test_the_rig_s_filter_is_found_and_taken_out(rig, paper_model, correlation):
-    found = [MeasuredLoop(prepare_loop(rig(seed, force_correlation=correlation).loops[0])) for seed in range(15)]
-    rows = np.array([data_set.prepared.row_noise.rows_as_one for data_set in found])
+    found = [prepare_loop(rig(seed, force_correlation=correlation).loops[0]) for seed in range(15)]
+    rows = np.array([data_set.row_noise.rows_as_one for data_set in found])
     assert rows.mean() == pytest.approx((1.0 + correlation) / (1.0 - correlation), rel=0.15)
     assert np.mean([data_set.relative_noise for data_set in found]) == pytest.approx(3e-3, rel=0.06)
     assert found[0].independent_count == pytest.approx(found[0].residual_count / rows[0])
@@ -117,10 +116,10 @@ def test_the_rig_s_filter_is_found_and_taken_out(rig, paper_model, correlation):
     )
     assert abs(np.mean([np.corrcoef(each[1:], each[:-1])[0, 1] for each in white])) < 0.02
     if not correlation:
-        assert np.mean([data_set.prepared.row_noise.order > 0 for data_set in found]) < 0.15
-        assert found[0].prepared.correlation_text == ""
+        assert np.mean([data_set.row_noise.order > 0 for data_set in found]) < 0.15
+        assert correlation_text(found[0]) == ""
     if correlation == 0.9:
-        assert found[0].prepared.correlation_text.startswith(", correlated over about ")
+        assert correlation_text(found[0]).startswith(", correlated over about ")
 
 
 def test_whitening_is_exact_from_the_first_row_on():
@@ -170,9 +169,9 @@ def test_harmonics_err_as_the_noise_says(kind, cycles, rows, correlation):
         made = low_passed(random, phase.size) if kind == "low-passed" else filtered(random, phase.size, correlation)
         motion = 1e-3 * np.sin(2.0 * np.pi * phase + 0.4)
         force = true_force(phase) + 0.3 * made
-        data_set = MeasuredLoop(prepare_loop(Loop("long", Direction.AXIAL, 10.0 * phase, motion, force)))
-        prepared = data_set.prepared
-        assert prepared.force.size < phase.size or cycles < 5
-        error = data_set.whiten((true_force(prepared.phase) - prepared.force) * data_set._per_noise)
+        data_set = prepare_loop(Loop("long", Direction.AXIAL, 10.0 * phase, motion, force))
+        prepared = data_set
+        assert prepared.measured_force.size < phase.size or cycles < 5
+        error = data_set.whiten((true_force(prepared.phase) - prepared.measured_force) * data_set._per_noise)
         squares.append(np.mean(np.square(error @ np.linalg.qr(data_set.smooth_changes()[1:].T)[0])))
     assert 0.7 < np.mean(squares) < 1.5

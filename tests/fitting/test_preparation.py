@@ -12,8 +12,8 @@ from bushfit.fitting.loop_cycles import steady_cycles
 from bushfit.fitting.loop_harmonics import MOST_ROWS
 from bushfit.fitting.noise import SweepNoise
 from bushfit.fitting.preparation import MeasuredLoop, MeasuredSweep, MeasuredTest, prepare_loops
+from bushfit.fitting.prepare_loop import prepare_loop
 from bushfit.fitting.prepared_campaign import PreparedCampaign
-from bushfit.fitting.prepared_loop import prepare_loop
 from bushfit.geometry import Direction
 from bushfit.model.model import FIVE, Model
 from bushfit.reading.measurement import Loop, Sweep
@@ -36,7 +36,7 @@ def sweep(paper_model) -> MeasuredSweep:
     stiffness = paper_model.stiffness("axial", frequency, amplitude)
     test = Sweep("sweep", Direction.AXIAL, frequency, amplitude, stiffness, repeat)
     levels = {("sweep", 1e-4): RANDOM, ("sweep", 5e-4): (1e-2, 2e-3)}
-    return MeasuredSweep(test, SweepNoise(levels, SHARED, "repeats", 6))
+    return MeasuredSweep(test=test, noise=SweepNoise(levels, SHARED, "repeats", 6))
 
 
 @pytest.fixture
@@ -108,14 +108,14 @@ def test_the_jacobian_is_that_of_the_residual(rig, sweep, paper_model, kind):
 
 
 def test_the_right_model_of_a_loop_leaves_noise_alone(loop, paper_model):
-    residual, counted = loop.residual(paper_model), loop.prepared.weight > 0.0
+    residual, counted = loop.residual(paper_model), loop.weights > 0.0
     assert residual.size == loop.size == loop.test.time.size
     assert loop.residual_count == np.count_nonzero(counted) > 0.99 * loop.size
     assert np.std(residual[counted]) == pytest.approx(1.0, abs=0.05)
     assert abs(np.corrcoef(residual[1:], residual[:-1])[0, 1]) < 0.06
     assert loop.relative_noise == pytest.approx(3e-3, rel=0.1)
     relative = loop.relative_difference(paper_model)[0, counted]
-    weighed = relative / loop.relative_noise * np.sqrt(loop.prepared.weight[counted])
+    weighed = relative / loop.relative_noise * np.sqrt(loop.weights[counted])
     np.testing.assert_allclose(residual[counted], weighed, rtol=1e-9)
     assert np.array_equal(loop.distance(paper_model), np.abs(residual))
     assert np.max(np.abs(loop.noise_free(paper_model).residual(paper_model))) < 1e-9
@@ -197,12 +197,12 @@ CASES: dict[str, dict[str, Any]] = {
 def test_the_motion_is_cleared_and_the_true_model_leaves_only_noise(paper_model, case):
     """One peak and one trough a cycle, where the motion has them, although the sensor turns at every other row."""
     loop = measured(paper_model, **CASES[case])
-    data_set = MeasuredLoop(prepare_loop(loop))
-    cycle = data_set.prepared.history(is_transient=False).value
+    data_set = prepare_loop(loop)
+    cycle = data_set.history(is_transient=False).value
     turns = np.flatnonzero(np.diff(np.sign(np.diff(np.append(cycle, cycle[0])))) != 0)
     residual = data_set.residual(paper_model)
     reduced = float(residual @ residual) / residual.size
-    assert data_set.prepared.frequency == pytest.approx(FREQUENCY, rel=2e-3)
+    assert data_set.frequency == pytest.approx(FREQUENCY, rel=2e-3)
     assert turns.size
     assert np.all(np.abs(cycle[turns]) > 0.95 * AMPLITUDE)
     assert (cycle.max(), -cycle.min()) == pytest.approx((AMPLITUDE, AMPLITUDE), rel=1.5e-2)
@@ -213,14 +213,14 @@ def test_the_motion_is_cleared_and_the_true_model_leaves_only_noise(paper_model,
 def test_many_rows_are_binned_without_loss(paper_model):
     loop = measured(paper_model, cycles=5.0, rows=40_000)
     prepared = prepare_loop(loop)
-    assert prepared.force.size <= 5 * 1024 + 1
-    assert 0.99 * loop.force.size < prepared.weight.sum() < loop.force.size  # the turning points carry none
+    assert prepared.measured_force.size <= 5 * 1024 + 1
+    assert 0.99 * loop.force.size < prepared.weights.sum() < loop.force.size  # the turning points carry none
     assert loop.force.size > MOST_ROWS
-    residual = MeasuredLoop(prepared).residual(paper_model)
+    residual = prepared.residual(paper_model)
     reduced = float(residual @ residual) / residual.size
     assert 0.9 < reduced < 1.15
     few = prepare_loop(measured(paper_model, cycles=5.0, rows=500))
-    assert prepared.first_harmonic == pytest.approx(few.first_harmonic, rel=2e-3)
+    assert prepared.measured == pytest.approx(few.measured, rel=2e-3)
 
 
 @pytest.mark.parametrize("waveform", ["sine", "triangle"])
@@ -283,7 +283,7 @@ def recorded(model: Model, *motions: Array, noise: float = 3e-3) -> Loop:
 @pytest.mark.parametrize("case", RUN_INS)
 def test_the_true_model_leaves_only_noise_of_the_steady_cycles(paper_model, case):
     prepared = prepare_loop(recorded(paper_model, *RUN_INS[case]))
-    gap = float(np.sqrt(np.mean(np.square(MeasuredLoop(prepared).relative(paper_model)))))
+    gap = float(np.sqrt(np.mean(np.square(prepared.relative(paper_model)))))
     (note,) = prepared.notes
     assert "left out" in note
     assert prepared.frequency == pytest.approx(1.0 / PERIOD, rel=2e-3)

@@ -79,7 +79,7 @@ def test_the_mean_over_seeds_is_the_truth(rig, models, name, seeds):
 
 def test_radial_sweep_follows_from_axial_tests(measured, result):
     """The paper's claim: within 3 % in magnitude and 0.01 in loss factor of the means over the repeats."""
-    (sweep,) = [data_set.sweep for data_set in measured.sweeps if data_set.direction is Direction.RADIAL]
+    (sweep,) = [data_set.test for data_set in measured.sweeps if data_set.direction is Direction.RADIAL]
     points = np.stack((sweep.frequency, sweep.amplitude))
     (frequency, amplitude), place, count = np.unique(points, axis=1, return_inverse=True, return_counts=True)
     mean = (np.bincount(place, sweep.stiffness.real) + 1j * np.bincount(place, sweep.stiffness.imag)) / count

@@ -110,9 +110,9 @@ def _noise_free(model: Model, truth: Model, test: SimulatedSweep) -> MeasuredSwe
     """One run of a sweep, as the truth has it."""
     sweep = planned_sweep(model, test.direction, *operating_points(test), NOISE.scatter, NOISE.shared)
     if test.stepped == "amplitude":
-        held = replace(sweep.sweep, stepped="amplitude")
+        held = replace(sweep.test, stepped="amplitude")
         noise = replace(sweep.noise, random={("new", test.frequencies[0]): NOISE.scatter})
-        sweep = replace(sweep, sweep=held, noise=noise)
+        sweep = replace(sweep, test=held, noise=noise)
     return sweep.noise_free(truth)
 
 

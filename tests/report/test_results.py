@@ -168,11 +168,11 @@ def test_loops_row_by_row_and_sweeps_by_amplitude_repeat_and_frequency(measured,
     assert len(table) == loop.time.size
     np.testing.assert_allclose(table["force [N]"], loop.force, rtol=1e-12)
     np.testing.assert_allclose(table["displacement [mm]"], 1e3 * loop.displacement, atol=2e-3)
-    off = (table["force [N]"] - table["model force [N]"]) / measured.loops[0].prepared.noise
+    off = (table["force [N]"] - table["model force [N]"]) / measured.loops[0].noise
     np.testing.assert_allclose(table["residual [noise]"], off, rtol=1e-9, atol=1e-9)
     assert np.std(table["residual [noise]"]) == pytest.approx(1.0, abs=0.1)
     table = sweeps_table(paper_model, measured.sweeps)
-    assert len(table) == sum(data_set.sweep.frequency.size for data_set in measured.sweeps)
+    assert len(table) == sum(data_set.test.frequency.size for data_set in measured.sweeps)
     assert list(dict.fromkeys(table["direction"])) == ["axial", "radial"]
     axial = table[table["direction"] == "axial"].reset_index(drop=True)
     frequency, amplitude = axial[["frequency [Hz]", "amplitude [mm]"]].to_numpy().T

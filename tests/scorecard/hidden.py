@@ -196,9 +196,7 @@ def _noise_free_data(model: Model, plan: SimulateSettings) -> list[MeasuredTest]
     campaign = Campaign("plan", Path("plan"), model.bushing, tuple(loops), tuple(sweeps))
     data = PreparedCampaign.from_campaign(campaign)
     loops_of_model = [loop.noise_free(model) for loop in data.loops]
-    silent = [
-        replace(loop, prepared=replace(loop.prepared, noise=3e-3 * loop.prepared.half_range)) for loop in loops_of_model
-    ]
+    silent = [replace(loop, noise=3e-3 * loop.half_range) for loop in loops_of_model]
     return [*silent, *(sweep.noise_free(model) for sweep in data.sweeps)]
 
 
