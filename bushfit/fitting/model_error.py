@@ -42,9 +42,9 @@ from bushfit.fitting.discrepancy import (
     discrepancies,
 )
 from bushfit.fitting.levels import LevelErrors, level_error_columns, level_errors
-from bushfit.fitting.preparation import MeasuredLoop, MeasuredTest, residual_slices, split_by_kind
+from bushfit.fitting.preparation import MeasuredLoop, MeasuredSweep, MeasuredTest, residual_slices, split_by_kind
 from bushfit.fitting.problem import FitProblem, FitResult, SmoothError
-from bushfit.fitting.rig_class import class_errors, format_class_errors, largest_error
+from bushfit.fitting.rig_class import UNSTATED_LEVEL, class_errors, format_class_errors, largest_error
 from bushfit.fitting.shared_errors import SharedErrors
 from bushfit.fitting.starts import start_values
 from bushfit.gaussian_process import MAXIMUM_NODES, RestrictedLikelihood
@@ -129,14 +129,15 @@ def with_model_error(
     closest, size = closest_fit(plain_fit, bounds)
     if size >= SIZES[-1]:  # that is no error of a model, but another thing than it
         return plain_fit, None
-    tests = FittedTests(closest.reevaluate(closest.model, _thinned(plain_fit.problem.tests, size)))
+    with_levels = _with_unseen_level_errors(plain_fit.problem.tests, rig)
+    tests = FittedTests(closest.reevaluate(closest.model, _thinned(with_levels, size)))
     sizes = np.geomspace(_SMOOTH_RATIO[0] * size, _SMOOTH_RATIO[1] * size, 9)
     processes = [replace(process, sizes=sizes) for process in discrepancies(tests)]
     likeliest = max(processes, key=lambda process: process.best[0])
     error = averaged(processes)
     if error.rms >= SIZES[-1]:
         return plain_fit, None
-    weighed = [test.with_model_error(size) for test in plain_fit.covariance_tests or plain_fit.problem.tests]
+    weighed = [test.with_model_error(size) for test in plain_fit.covariance_tests or with_levels]
     fitted = FittedTests(closest.reevaluate(closest.model, weighed))
     whole = Discrepancy.over_tests(fitted, likeliest.groups, likeliest.lengths, MAXIMUM_NODES)
     columns = whole.tests.residual_changes(likeliest.best[1] * whole.complex_shapes)
@@ -290,6 +291,24 @@ def _is_smooth(tests: FittedTests) -> bool:
         return False
     evidence = [process.likelihood.log_evidence(SIZES) for process in discrepancies(tests)]
     return float(np.logaddexp.reduce(evidence)) - np.log(len(evidence)) + np.log(_ODDS) >= 0.0
+
+
+def _with_unseen_level_errors(tests: Sequence[MeasuredTest], rig: RigSettings) -> list[MeasuredTest]:
+    """Add the expected errors that all runs of a level share to sweeps whose noise is known from repeats alone.
+
+    A smooth error of the model follows these errors from level to level, and is uncertain by them.
+    """
+    noises, expected = {}, class_errors(rig, UNSTATED_LEVEL)
+    for sweep in split_by_kind(tests)[1]:
+        if sweep.noise.origin == "repeats":
+            gain, phase = np.maximum(expected, sweep.noise.level).tolist()
+            noises[id(sweep.noise)] = replace(sweep.noise, level=(gain, phase))
+    return [
+        replace(test, noise=noises[id(test.noise)])
+        if isinstance(test, MeasuredSweep) and id(test.noise) in noises
+        else test
+        for test in tests
+    ]
 
 
 def _errors_of_class(test: MeasuredTest, rig: RigSettings) -> Array:

@@ -6,6 +6,9 @@ from bushfit.campaign.schema import RigSettings
 
 #: Class of a rig without stated class: relative gain error and phase error [rad]; chosen: that of most rigs.
 ASSUMED = (5e-3, float(np.radians(0.25)))
+#: Expected errors that all runs of a level share, which repeats cannot reveal, if [rig] states no class: 0.58 times the
+#: class, the root mean square of the sizes within the class by their prior weights (`LEVELS` of the diagnosis).
+UNSTATED_LEVEL = (0.58 * ASSUMED[0], 0.58 * ASSUMED[1])
 #: Largest error, in units of the rig's class, that is attributed to the rig; chosen: as for outliers of normal errors.
 _MOST_CLASSES = 3.0
 

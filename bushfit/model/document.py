@@ -226,12 +226,14 @@ class AlternativeTable:
         values: parameter values of the other model by name [SI].
         probability: probability of the other model by the diagnosis.
         covariance: covariance of the parameters in the fit of the other model.
+        unnamed: data of the effect unnamed, a smooth correction, of the other model.
     """
 
     effects: tuple[str, ...]
     values: Mapping[str, Number]
     probability: Annotated[Number, Field(ge=0.0, le=1.0)]
     covariance: Annotated[CovarianceTable, AfterValidator(_check_covariance)] = CovarianceTable((), ())
+    unnamed: Unnamed | None = None
 
 
 @dataclass(frozen=True)

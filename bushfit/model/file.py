@@ -89,8 +89,7 @@ def from_document(document: object, file: Path | None = None) -> Result:
         alternatives = []
         for rank, row in enumerate(tables.alternatives, 1):
             with error_location(place=f"alternatives, #{rank}"):
-                unnamed = tables.unnamed if UNNAMED in row.effects else None
-                rival = Model(bushing, row.effects, row.values, unnamed)
+                rival = Model(bushing, row.effects, row.values, row.unnamed)
                 alternatives.append(Alternative(rival, row.probability, _covariance(row.covariance, rival)))
         result = Result(
             model,
@@ -193,7 +192,11 @@ def to_document(result: Result) -> dict[str, Any]:
         model_error=result.model_error,
         alternatives=tuple(
             AlternativeTable(
-                rival.model.effects, dict(rival.model.values), rival.probability, _covariance_table(rival.covariance)
+                rival.model.effects,
+                dict(rival.model.values),
+                rival.probability,
+                _covariance_table(rival.covariance),
+                rival.model.unnamed,
             )
             for rival in result.alternatives
         ),

@@ -78,7 +78,7 @@ def alternative_models(result: Result, *, rig: bool) -> Iterator[tuple[Result, M
     """
     resolved = {*result.model.effects} - {*result.unresolved}
     for other in result.alternatives:
-        explained = replace(result, model_error=None, covariance=other.covariance)
+        explained = replace(result, model=other.model, model_error=None, covariance=other.covariance)
         twins = [effect.name for effect in other.model.records if effect.twins and effect.name not in resolved]
         yield from ((explained, model) for model in ([other.model] if rig else car_models(other.model, twins)))
 

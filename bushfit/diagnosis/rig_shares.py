@@ -1,0 +1,108 @@
+"""Alternatives to a smooth correction: the same measured stiffness, with a part of it taken for an effect of the rig."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.linalg import block_diag
+from scipy.special import softmax
+
+from bushfit.diagnosis.hypotheses import Hypothesis, mean_parameters
+from bushfit.effects import get_effect, qualified_name
+from bushfit.effects.contract import Array, Level, RubberConditions
+from bushfit.effects.unnamed import Patch, Unnamed
+from bushfit.fitting.problem import FitResult
+from bushfit.geometry import Place
+from bushfit.model.covariance import Covariance
+from bushfit.model.model import Model
+from bushfit.model.result import Alternative, Result
+
+#: Least probability of an alternative; chosen for time: in a mixture, a rarer one moves no 95 % band.
+_LEAST = 0.01
+#: Iterations for a correction with which a model keeps its stiffness; each reduces a change of 5 % twentyfold.
+_ITERATIONS = 3
+
+
+def rig_alternatives(result: Result, hypotheses: Sequence[Hypothesis], base: FitResult) -> tuple[Alternative, ...]:
+    """List models in which effects of the rig are a part of what the smooth correction of a result contains.
+
+    A correction closes the gap between model and tests, whatever its cause. Effects of the rubber and the component
+    stay in the car and are predicted well by the correction; effects of the rig do not. So hypotheses are grouped by
+    their effects of the rig, and each group gives one model with the measured stiffness of the result.
+
+    Args:
+        result: result whose model has a smooth correction.
+        hypotheses: all hypotheses about the gap.
+        base: starting model, fitted to the tests.
+
+    Returns:
+        Alternatives with their probabilities. The rest to 1 is the probability that the rig has the effects of the
+        result's model and no others.
+    """
+    shares = softmax([hypothesis.log_posterior for hypothesis in hypotheses]).tolist()
+    probability, members = (
+        defaultdict[frozenset[str], float](float),
+        defaultdict[frozenset[str], list[Hypothesis]](list),
+    )
+    for hypothesis, share in zip(hypotheses, shares, strict=True):
+        effects = _of_rig(hypothesis.effects)
+        probability[effects] += share
+        if hypothesis.refitted and not hypothesis.claim:
+            members[effects].append(hypothesis)
+    current = _of_rig(result.model.effects) - {*base.model.effects}
+    places = {str(test.direction): test.direction for test in base.data_sets}
+    alternatives = []
+    for effects, share in probability.items():
+        if effects == current or share < _LEAST or not members[effects]:
+            continue
+        names = [qualified_name(effect, p) for effect in map(get_effect, sorted(effects)) for p in effect.parameters]
+        amounts, known = mean_parameters(members[effects], names)
+        model = result.model.without(*current)
+        for name in sorted(effects):
+            model = model.with_effect(name, amounts)
+        corrected = _with_stiffness_of(result.model, model, places)
+        kept = result.covariance.restricted([name for name in model.values if name not in names])
+        matrix = block_diag(kept.matrix, known.matrix)
+        alternatives.append(Alternative(corrected, share, Covariance((*kept.names, *known.names), matrix)))
+    return tuple(alternatives)
+
+
+def _of_rig(names: Iterable[str]) -> frozenset[str]:
+    """Select the effects of the rig, and those with a twin in the rig."""
+    return frozenset(name for name in names if get_effect(name).twins or get_effect(name).level is Level.INSTRUMENT)
+
+
+def _with_stiffness_of(measured: Model, model: Model, places: Mapping[str, Place]) -> Model:
+    """Change the smooth correction of a model so that it has the stiffness of another model at the nodes.
+
+    Args:
+        measured: model with the stiffness to keep, with a smooth correction.
+        model: model with other effects of the rig and the same correction.
+        places: tested directions and specimens by name.
+    """
+    assert measured.unnamed is not None
+    single = [
+        (name, replace(patch, directions=(name,))) for patch in measured.unnamed.patches for name in patch.directions
+    ]
+    unnamed = replace(measured.unnamed, patches=tuple(patch for _, patch in single))
+    for _ in range(_ITERATIONS):
+        model = replace(model, unnamed=unnamed)
+        patches = []
+        for (name, _), patch in zip(single, unnamed.patches, strict=True):
+            ratio = _at_nodes(measured, patch, places[name]) / _at_nodes(model, patch, places[name])
+            share = (1.0 + np.array(patch.in_phase) + 1j * np.array(patch.in_quadrature)) * ratio - 1.0
+            patches.append(
+                replace(patch, in_phase=tuple(share.real.tolist()), in_quadrature=tuple(share.imag.tolist()))
+            )
+        unnamed = Unnamed(unnamed.size, unnamed.lengths, tuple(patches))
+    return replace(model, unnamed=unnamed)
+
+
+def _at_nodes(model: Model, patch: Patch, place: Place) -> Array:
+    """Stiffness of a model at the nodes of a smooth correction [N/m or N m/rad], (m,)."""
+    amplitude = np.array(patch.strain) / model.unit_strain(place)
+    conditions = RubberConditions(np.array(patch.temperature_K) if patch.temperature_K else None)
+    return model.stiffness(place, np.array(patch.frequency_Hz), amplitude, conditions=conditions)
