@@ -132,7 +132,9 @@ class Odds:
 
         Returns:
             The result with, for each other explanation, the squared difference of its parameters times its probability
-            added to the covariance; and with the explanations as alternatives if the tests cannot distinguish them.
+            added to the covariance; and with the explanations as alternatives if the tests cannot distinguish them. A
+            fit with a parameter at its bound is left out of the covariance: without mu, coefficients over mu are
+            meaningless.
         """
         cov, current = result.covariance, result.model.values
         matrix, alternatives = cov.matrix.copy(), list[Alternative]()
@@ -141,7 +143,8 @@ class Odds:
                 continue
             model, covariance = fit
             difference = np.array([model.values.get(name, current[name]) - current[name] for name in cov.names])
-            matrix += (1.0 - self.nothing) * probability * np.outer(difference, difference)
+            if {*cov.names} & {*model.values} <= {*covariance.names}:
+                matrix += (1.0 - self.nothing) * probability * np.outer(difference, difference)
             if self.are_alternatives:
                 alternatives.append(Alternative(model, (1.0 - self.nothing) * probability, covariance))
         return replace(result, covariance=replace(cov, matrix=matrix), alternatives=tuple(alternatives))

@@ -1,4 +1,4 @@
-"""Alternatives to a smooth correction: the same measured stiffness, with a part of it taken for an effect of the rig."""
+"""Alternatives to a smooth correction: the same measured stiffness, with a part of it taken for effects of the rig."""
 
 from __future__ import annotations
 

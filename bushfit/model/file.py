@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from bushfit.effects import ORIGINS
-from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.errors import ModelError, error_location
 from bushfit.geometry import Bushing, Specimen
 from bushfit.model.covariance import Covariance
