@@ -3,6 +3,7 @@
 Amounts of rig faults and bands have to include what the compound's own deviation from the model may imitate.
 """
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -13,6 +14,7 @@ from scipy.special import ndtri
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.simulated import SimulatedLoop, SimulatedSweep, SimulateSettings
 from bushfit.geometry import Direction
+from bushfit.model.file import from_document, to_document
 from bushfit.prediction.stiffness import predict
 from bushfit.reading.measurement import Loop
 from bushfit.simulation.measured import measure
@@ -114,3 +116,16 @@ def test_the_interval_of_a_rig_fault_includes_what_the_rubber_may_imitate(
     assert low <= truth <= high
     assert (high - low) / 2.0 < sharpest * truth, "and it still determines the fault"
     assert min(shares) >= 0.9
+
+
+def test_bands_include_that_a_part_of_the_correction_belongs_to_the_rig(rubber, paper_model):
+    """A rig of 0.02 mm/kN, which this rubber and the formula of one direction may imitate."""
+    diagnosis = asked(rubber(lambda k, _: k / (1.0 + 2e-8 * k)))
+    result, shares = diagnosis.result, coverage(diagnosis, paper_model.bushing)
+    band = predict(result, Direction.RADIAL, [45.0], [2e-4]).stiffness
+    print(diagnosis.verdict, diagnosis.odds.labels, shares, (band.low, band.value, band.high))
+    assert result.model.unnamed
+    assert min(shares) >= 0.9
+    assert band.high[0] - band.low[0] < 0.15 * band.value[0]
+    again = from_document(json.loads(json.dumps(to_document(result))))
+    np.testing.assert_array_equal(predict(again, Direction.RADIAL, [45.0], [2e-4]).stiffness.high, band.high)
