@@ -280,7 +280,9 @@ def reader_keywords(
         CampaignError: a test that is listed twice, or that states no direction or specimen.
     """
     listed_tests = set()
-    sources = [(os.path.normpath(path.parent / test.file), test.sheet, test.temperature) for test in tests]
+    sources = [
+        (os.path.normpath(path.parent / test.file), test.sheet, test.temperature, test.preload) for test in tests
+    ]
     counts = Counter(sources)
     for test, source, name in zip(tests, sources, names, strict=True):
         if (identity := (*source, test.direction, test.specimen_number, *test.rows.items())) in listed_tests:
@@ -306,9 +308,10 @@ def _test_names(tests: Sequence[LoopFile | SweepFile]) -> list[str]:
     """Make a unique name for each test of a campaign.
 
     The name is the stem of the file, or the path as the campaign lists it if two files have the same stem. If one file
-    contains several tests, sheet, temperature, direction, specimen number and selected rows are added.
+    contains several tests, sheet, temperature, direction, specimen number, preload and selected rows are
+    added.
     """
-    keys = ("direction", "specimen_number")
+    keys = ("direction", "specimen_number", "preload")
     stems, values = Counter(Path(test.file).stem for test in tests), defaultdict[str, list[tuple[Any, ...]]](list)
     for test in tests:
         values[test.file].append(tuple(getattr(test, key) for key in keys))

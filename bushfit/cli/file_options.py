@@ -36,7 +36,7 @@ _NO_TESTS = {".toml": "a campaign or another TOML file", ".json": "a model or an
 #: click types of the options by key; other options are texts.
 TYPES: dict[str, "click.ParamType[Any]"] = {
     "direction": click.Choice(DIRECTIONS),
-    "delimiter": click.Choice(["comma", "semicolon", "tab", "pipe", "caret", "blanks"]),
+    "delimiter": click.Choice(["comma", "semicolon", "tab", "pipe", "caret", "blanks", ",", ";", "\t", "|", "^"]),
     "waveform": click.Choice(["sine", "triangle"]),
     "amplitude": click.Choice(["zero-to-peak", "peak-to-peak", "rms"]),
     **dict.fromkeys(("force_sign", "elements", "header_line"), click.INT),

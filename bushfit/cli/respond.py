@@ -51,6 +51,7 @@ def command(model: Path, history: Path, directions: tuple[str, ...], output: Out
     from bushfit.commands.loading import load_model, model_file
     from bushfit.commands.respond import respond
     from bushfit.reading.layout import FileFormat
+    from bushfit.validation import validate_tables
 
     if len(directions) > 1:
         raise click.UsageError(
@@ -60,8 +61,9 @@ def command(model: Path, history: Path, directions: tuple[str, ...], output: Out
     folder = output.folder(result.name, output.formats.table("response"))
     test_options = settings.pop("test_options")
     settings |= {key: test_options.pop(key, None) for key in ("columns", "units")}
-    settings |= {"direction": directions[0] if directions else None, "file_format": FileFormat(**test_options)}
+    settings |= {"direction": directions[0] if directions else None}
     with options_named():
+        settings["file_format"] = validate_tables(test_options, None, FileFormat)
         response = respond(result, history, **settings)
     print_response(output, response)
     output.write(folder, response.files, response.document, [model_file(model), history])

@@ -25,6 +25,7 @@ from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS
 from bushfit.reading.instruments import word_for_part
 from bushfit.reading.labelled import same_text
 from bushfit.reading.layout import FileFormat
+from bushfit.reading.levels import split_conditions
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.reading.names import NO_LABELS, Labels, labels_above, labels_in_names
 from bushfit.reading.parts import open_file
@@ -166,7 +167,7 @@ def split_sheets(file: TestSource, test_options: Mapping[str, Any]) -> tuple[lis
 
 
 def split_rows(source: TestSource) -> tuple[list[TestSource], list[str]]:
-    """Split a file with columns for direction, part number or run into one test for each combination of their values.
+    """Split a file with columns for direction, part number, run, temperature or preload into one test for each level.
 
     The runs of a sweep are repeats and are not split. The runs of a loop are split only if time restarts in each run.
 
@@ -175,20 +176,25 @@ def split_rows(source: TestSource) -> tuple[list[TestSource], list[str]]:
     """
     test_options, tests, left_out = source.test_options, list[TestSource](), list[str]()
     try:
-        table, _ = recognize_table(source.file, source.without("direction", "specimen_number").test_options)
+        table, is_sweep = recognize_table(source.file, source.without("direction", "specimen_number").test_options)
         columns = dict(table.row_labels)
         if "run" in columns and "time" in table.roles:
             time = table.read({"time": table.roles["time"]}, fewest_rows=1)[0]["time"]
             if np.all(np.diff(time) > 0.0):
                 del columns["run"]
+        labels = list(zip(*(texts for _, texts in columns.values()), strict=True))
+        rows_of = {row: np.flatnonzero([label == row for label in labels]) for row in dict.fromkeys(labels)}
+        if is_sweep and not columns:
+            rows_of = {(): np.arange(sum(1 for _ in table.rows()))}
+        conditions = {row: split_conditions(table, rows, test_options, table.motion) for row, rows in rows_of.items()}
     except BushfitError:  # which the inspection of the file reports
         return [source], []
-    for texts in dict.fromkeys(zip(*(texts for _, texts in columns.values()), strict=True)):
+    for texts, tests_at_levels in conditions.items():
         keys: dict[str, Any] = dict(zip(columns, texts, strict=True))
         run = {"rows": {table.headers[columns["run"][0]]: keys.pop("run")}} if "run" in keys else {}
         is_direction = keys.get("direction", "axial") in [*Direction]
         if is_direction and all(same_text(str(test_options.get(key, text)), text) for key, text in keys.items()):
-            tests.append(replace(source, test_options={**test_options, **keys, **run}))
+            tests += [replace(source, test_options={**test_options, **keys, **run, **test}) for test in tests_at_levels]
         else:
             why = "other values were stated" if is_direction else "the direction is unknown"
             left_out.append(f"{source}: rows of {', '.join(texts)} are not used: {why}")
@@ -223,7 +229,7 @@ def distribute_options(sources: Sequence[TestSource], test_options: Mapping[str,
             with suppress(BushfitError):  # which the inspection of the file reports
                 counts[index] = count_temperatures(recognize_table(source.file, by_source[index])[0])
         for index, count in counts.items():
-            if count == 0 and 2 in counts.values():
+            if count == 0 and max(counts.values()) > 1:
                 by_source[index]["temperature"] = None
     return [replace(source, test_options=keys) for source, keys in zip(sources, by_source, strict=True)]
 

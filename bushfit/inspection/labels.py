@@ -9,10 +9,10 @@ import numpy as np
 
 from bushfit.geometry import Place
 from bushfit.reading.headers import ZERO_TO_PEAK, AmplitudeConvention
+from bushfit.reading.levels import find_levels, read_condition
 from bushfit.reading.names import Labels, StatedQuantity, labels_in_names
 from bushfit.reading.si_columns import columns_key
 from bushfit.reading.stiffness import hint_for_convertible_columns
-from bushfit.reading.sweeps import ONE_TEST
 from bushfit.reading.table import Table
 from bushfit.units import parse_quantity
 
@@ -26,11 +26,9 @@ _AGREEMENT = 0.03
 
 
 def count_temperatures(table: Table) -> int:
-    """Number of temperatures in a table: 0 without a temperature column, 1 for one temperature, 2 for several."""
-    if (column := table.roles.get("temperature")) is None:
-        return 0
-    temperatures = table.read({"temperature": column}, fewest_rows=1)[0]["temperature"]
-    return 1 if np.ptp(temperatures) <= ONE_TEST else 2
+    """Number of temperatures in the columns of a table: 0 without such a column."""
+    condition = read_condition(table, "temperature", table.motion)
+    return len(find_levels(table, condition, np.arange(condition.values.size))) if condition else 0
 
 
 def labels_of_file(file: Path, sheet: str, test_options: Mapping[str, Any]) -> Labels:
@@ -105,7 +103,7 @@ def keys_from_labels(
     for key, name in _CONDITIONS.items():
         texts = ((origin, text) for origin, labels in sources.items() if (text := getattr(labels, key)))
         origin, text = next(texts, ("", ""))
-        if text and key not in table.roles and key not in test_options:
+        if text and key not in test_options and (key != "temperature" or key not in table.roles):
             keys[key] = text
             facts.setdefault(origin, []).append(f"{name} {text}")
     return keys, {origin: ", ".join(sentences) for origin, sentences in facts.items()}, has_convention

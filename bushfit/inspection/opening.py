@@ -225,8 +225,10 @@ def describe_columns(table: Table, *, is_sweep: bool) -> tuple[ColumnDescription
     for key, (index, _) in table.row_labels.items():
         columns[index] = ColumnDescription(table.headers[index], key.replace("_", " "), None)
     for role, column in table.roles.items():
-        ends = (float(values[role].min()), float(values[role].max())) if role in values else (None, None)
-        columns[column.index] = ColumnDescription(column.header, role.replace("_", " "), column.unit, *ends)
+        is_read = role in values and column.subtracted is None
+        ends = (float(values[role].min()), float(values[role].max())) if is_read else (None, None)
+        for index in column.indices:
+            columns[index] = ColumnDescription(table.headers[index], role.replace("_", " "), column.unit, *ends)
     return tuple(columns)
 
 

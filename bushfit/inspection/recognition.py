@@ -179,7 +179,8 @@ def open_content(file: Path, test_options: Mapping[str, Any]) -> OpenedFile:
     Raises:
         MeasurementError: the file cannot be read.
     """
-    return open_file(file, FileFormat(**{field.name: test_options.get(field.name) for field in fields(FileFormat)}))
+    stated = {field.name: test_options[field.name] for field in fields(FileFormat) if field.name in test_options}
+    return open_file(file, validate_tables(stated, None, FileFormat))
 
 
 def open_table(

@@ -10,7 +10,7 @@ from bushfit import units
 from bushfit.reading.headers import COUNTED, Vocabulary
 from bushfit.reading.layout import Layout, Line, is_comment, is_row, is_summary_row, is_units_row
 from bushfit.reading.names import NO_LABELS, Labels, labels_above, labels_in_names, named_direction
-from bushfit.reading.numerals import is_like_number
+from bushfit.reading.numerals import is_like_number, plainest_value
 from bushfit.reading.source import Channels, RowSource, Sheet, Text, cells_of
 
 #: Largest text that is searched for blocks without their own headers [bytes]; chosen: some 100,000 rows.
@@ -23,7 +23,9 @@ _NUMERIC = b"0123456789.,+-eEdD \t\r\n"
 _COMPLEX = re.compile(
     r"\(?\s*([+-]?[\d.,]+(?:[eEdD][+-]?\d+)?)\s*([+-]\s*[\d.,]+(?:[eEdD][+-]?\d+)?)\s*\*?\s*[ij]\s*\)?"
 )
-#: First rows that are searched for complex numbers; chosen: room for remarks.
+#: Number with a unit: "594.4 N/mm", "±0,5mm", "5.7°".
+_WITH_UNIT = re.compile(r"(?:±|\+/?-)?\s*(?P<number>[+-]?[\d.,]+(?:[eE][+-]?\d+)?)\s*(?P<unit>[^\d\s.,;:][^;]{0,20})")
+#: First rows that are searched for complex numbers and units; chosen: room for remarks.
 _FIRST = 8
 
 
@@ -65,7 +67,7 @@ def find_segments(
 
 
 def combined(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> tuple[RowSource, Layout]:
-    """Combine the blocks of a file into one table, and split complex numbers into two columns.
+    """Combine the blocks of a file into one table, and split cells with a complex number or a unit.
 
     Args:
         source: lines or rows of the file.
@@ -89,7 +91,7 @@ def combined(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> tuple
     else:
         blocks = _stacked(source, layout, vocabulary)
     if len(blocks) < 2:
-        return _with_complex_parts(source, layout)
+        return _with_plain_cells(source, layout)
     titles = [block.above[-1].text if block.above else "" for block in blocks]
     labels = [labels_above(block.above) | labels_in_names(title) for block, title in zip(blocks, titles, strict=True)]
     added = _label_columns(labels, titles, titles if sides else [], vocabulary.roles(layout.headers))
@@ -101,7 +103,7 @@ def combined(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> tuple
     layout = replace(layout, headers=(*layout.headers, *added), units=(*layout.units, *[""] * len(added)))
     head = [line for line in source.head() if line.number < layout.header_line]
     above = [line for line in head if not labels_above([line]).quantities]  # those of a block are in its rows
-    return _with_complex_parts(Sheet(source.sheet or "", content, above=above, numbers=numbers), layout)
+    return _with_plain_cells(Sheet(source.sheet or "", content, above=above, numbers=numbers), layout)
 
 
 def exchange_rows(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> Sheet | None:
@@ -251,23 +253,52 @@ def _label_columns(
     return columns
 
 
-def _with_complex_parts(source: RowSource, layout: Layout) -> tuple[RowSource, Layout]:
-    """Replace each column of complex numbers by two columns, real and imaginary part."""
+def _with_plain_cells(source: RowSource, layout: Layout) -> tuple[RowSource, Layout]:
+    """Split cells with more than a number: a complex number into two columns, a unit off into the row of units.
+
+    A unit is split off if the first cells of a column have compatible units; the first is that of the column.
+    """
     first = [cells_of(line, layout.delimiter) for line in islice(source.lines(layout.lines_before_data), _FIRST)]
-    indices = {n for row in first for n, cell in enumerate(row) if isinstance(cell, str) and _COMPLEX.fullmatch(cell)}
-    if not indices or max(indices) >= len(layout.headers):
-        return source, layout
     headers, row_of_units = list(layout.headers), list(layout.units)
+    by_column = [[str(row[n]) for row in first if n < len(row) and row[n] != ""] for n in range(len(headers))]
+    is_complex = [any(map(_COMPLEX.fullmatch, texts)) for texts in by_column]
+    unit_of = [_common_unit(texts) for texts in by_column]
+    if not any(is_complex) and not any(unit_of):
+        return source, layout
     lines = [(line.number, list(cells_of(line, layout.delimiter))) for line in source.lines(layout.lines_before_data)]
-    for index in sorted(indices, reverse=True):
+    for index in reversed(range(len(headers))):
         name, unit = units.split_header(headers[index])
-        headers[index : index + 1] = [f"{name} {part}{f' [{unit}]' if unit else ''}" for part in ("real", "imaginary")]
-        row_of_units[index : index + 1] = [row_of_units[index]] * 2
-        for _, cells in lines:
-            if match := _COMPLEX.fullmatch(str(cells[index])) if index < len(cells) else None:
+        if unit_of[index]:
+            row_of_units[index] = row_of_units[index] or unit_of[index]
+        elif is_complex[index]:
+            suffix = f" [{unit}]" if unit else ""
+            headers[index : index + 1] = [f"{name} real{suffix}", f"{name} imaginary{suffix}"]
+            row_of_units[index : index + 1] = [row_of_units[index]] * 2
+        for _, cells in lines if unit_of[index] or is_complex[index] else ():
+            text = str(cells[index]) if index < len(cells) else ""
+            if unit_of[index]:
+                cells[index : index + 1] = [_in_unit(text, unit_of[index])]
+            elif match := _COMPLEX.fullmatch(text):
                 cells[index : index + 1] = [match[1], re.sub(r"\s|^\+", "", match[2])]
             else:
                 cells.insert(index + 1, "")
     layout = replace(layout, headers=tuple(headers), units=tuple(row_of_units))
     numbers, content = zip(*lines, strict=True)
     return Sheet(source.sheet or "", content, numbers=numbers, above=source.head()), layout
+
+
+def _common_unit(texts: Sequence[str]) -> str:
+    """Unit behind the number in each of several cells, such as "mm" of "0.5 mm"; "" without such a unit."""
+    found = list(dict.fromkeys(match["unit"] if (match := _WITH_UNIT.fullmatch(text)) else "?" for text in texts))
+    return found[0] if found and all(units.is_compatible(unit, found[0]) for unit in found) else ""
+
+
+def _in_unit(text: str, unit: str) -> str | float:
+    """Number of a cell such as "500 um" in a unit; the text itself if it states no compatible unit."""
+    match = _WITH_UNIT.fullmatch(text)
+    if match is None or not units.is_compatible(match["unit"], unit):
+        return text
+    if match["unit"] == unit:
+        return match["number"]
+    ratio = units.si_factor(match["unit"], match["unit"]) / units.si_factor(unit, unit)
+    return float(f"{plainest_value(match['number']) * ratio:.12g}")

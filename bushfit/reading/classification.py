@@ -17,12 +17,14 @@ from bushfit.reading.headers import (
     WORDS,
     ZERO_TO_PEAK,
     Column,
+    Extreme,
     Heading,
     Vocabulary,
     is_angular,
     parse_unit,
     plain,
     split_convention,
+    split_extreme,
     split_unit,
 )
 from bushfit.reading.numerals import is_like_number, plainest_value
@@ -41,11 +43,13 @@ _STIFFNESS_AGREEMENT = 0.1
 #: Number above zero of a stated multiple of a unit, such as 200 N for the force of 1 V.
 _MULTIPLE = re.compile(r"^(?=[\d.]*[1-9])\d+\.?\d*(?=\s+[^\W\d_])")
 #: Roles that are ignored, without an error, if two different columns have them: other columns can replace them.
-_REPLACEABLE = ("force_amplitude", "damping_coefficient", "damping_ratio", "relative_error", "temperature")
+_REPLACEABLE = (
+    *("force_amplitude", "damping_coefficient", "damping_ratio", "energy", "relative_error", "temperature", "preload"),
+)
 #: Symbols of a displacement.
 _SYMBOLS = ("x", "u", "s", "w")
 #: Roles that state the loss of a sweep.
-_LOSSES = {"phase", "loss_factor", "loss_stiffness", "damping_coefficient", "damping_ratio"}
+_LOSSES = {"phase", "loss_factor", "loss_stiffness", "damping_coefficient", "damping_ratio", "energy"}
 #: Words in a header that mark a set point or mean, a part of a complex number, or an amplitude; by these kinds.
 _QUALIFIERS = {kind: frozenset(map(plain, words)) for kind, words in WORDS["qualifiers"].items()}
 #: Names of a strain that may be part of a compound, such as Scherdeformation.
@@ -78,6 +82,7 @@ def classify(
         UnitError: two different units for one column.
     """
     roles: dict[str, Column] = {}
+    extremes: dict[tuple[str, Extreme], Column] = {}
     rejected: set[str] = set()
     role_by_index = _stated_indices(table, vocabulary, columns)
     for index, header in sorted(enumerate(table.headers), key=lambda column: _name(column[1]) == "k"):  # after K*
@@ -90,17 +95,21 @@ def classify(
         if heading is None or (_name(header) == "k" and heading.role in roles):
             continue
         role, column = heading.role, _column_of(table, heading, index, stated_units.get(heading.role))
-        if role not in roles:
+        if heading.extreme:
+            extremes.setdefault((role, heading.extreme), column)
+        elif role not in roles:
             roles[role] = column
         elif role in _REPLACEABLE:
             rejected.add(role)
             del roles[role]
         else:
             roles[role] = _preferred(table, roles[role], column)
+    notes = _add_half_differences(table, roles, extremes)
     for role in ("amplitude_reached", "acceleration"):
         if role in roles and "amplitude" not in roles:
             roles["amplitude"] = replace(roles.pop(role), role="amplitude")
-    notes, unused = _add_by_unit(table, roles)
+    by_unit, unused = _add_by_unit(table, roles)
+    notes += by_unit
     if {"displacement", "force"} <= {*roles} and "displacement" not in columns:
         for column in (one for one in unused if _moves_along(table, roles["displacement"], one)):
             _preferred(table, roles["displacement"], replace(column, role="displacement"))
@@ -110,6 +119,8 @@ def classify(
             notes.append(f'"{column.header}" is read in the stated unit {column.unit}, not in {written} of the header')
     if {"force_amplitude", "stiffness"} & set(roles) and "amplitude" not in roles:
         notes += _add_motion_as_amplitude(table, roles, stated_units)
+    if "damping_coefficient" in roles and "stiffness" in roles and "stiffness" not in columns:
+        notes += _name_parallel_spring(roles)
     time = roles.get("time")
     is_clock = time is not None and clock(str(table.first_row[time.index])) is not None
     notes = [*table.layout.notes, *notes]
@@ -291,6 +302,64 @@ def _add_by_unit(table: Table, roles: dict[str, Column]) -> tuple[list[str], lis
         stamps = [column for column in free if clock(str(table.first_row[column.index])) is not None]
         roles |= {"time": replace(stamps[0], role="time")} if len(stamps) == 1 else {}
     return notes, list(free)
+
+
+def _add_half_differences(
+    table: Table, roles: dict[str, Column], extremes: Mapping[tuple[str, Extreme], Column]
+) -> list[str]:
+    """Use half the difference of maxima and minima as an amplitude, and add it to the known columns.
+
+    A column of peaks, read as an amplitude, contains maxima if another column of the same name contains valleys.
+
+    Args:
+        table: header and rows of the table.
+        roles: columns found so far, by role such as "force"; changed in place.
+        extremes: columns of maxima and minima, by the role of their amplitude.
+
+    Returns:
+        A sentence on each pair of columns, with their mean, which is the preload.
+    """
+    notes = []
+    for role in ("amplitude", "force_amplitude"):
+        low, high, known = extremes.get((role, "minimum")), extremes.get((role, "maximum")), roles.get(role)
+        if (
+            low
+            and known
+            and not high
+            and plain(split_extreme(low.header)[0]) == plain(split_convention(known.header)[0])
+        ):
+            high, known = known, None
+        if low is None or high is None or known or low.unit != high.unit:
+            continue
+        roles[role] = replace(high, subtracted=low.index, convention="peak-to-peak")
+        numbers = _first_numbers(table, (high, low))
+        mean, half = float(numbers.mean()), float(np.abs(numbers[:, 0] - numbers[:, 1]).mean()) / 2.0
+        note = f'half of "{high.header}" minus "{low.header}" is read as the {role.replace("_", " ")}'
+        if abs(mean) > _AGREEMENT * half:
+            note += (
+                f"; their mean is {units.number(mean, 3)} {high.unit or ''}, which is a preload if the zero is right"
+            )
+        notes.append(note)
+    return notes
+
+
+def _name_parallel_spring(roles: dict[str, Column]) -> list[str]:
+    """Read the stiffness beside a damping coefficient as K' if its name is the bare symbol k or c, else as |K*|.
+
+    k and c, or c and d, are the symbols of a spring and a dashpot in parallel; K is also a symbol of |K*|.
+
+    Returns:
+        A sentence on the choice, unless the symbol of the stiffness states it.
+    """
+    stiffness, loss = roles["stiffness"], roles["damping_coefficient"]
+    if "*" in stiffness.header or "|" in stiffness.header or {*roles} & _LOSSES != {"damping_coefficient"}:
+        return []
+    meaning, alternative = "the magnitude |K*|", "storage_stiffness"
+    if units.split_header(stiffness.header)[0].strip() in ("k", "c"):
+        roles["storage_stiffness"] = replace(roles.pop("stiffness"), role="storage_stiffness")
+        meaning, alternative = "the stiffness K' of a spring in parallel", "stiffness"
+    choice = f'columns = {{ {alternative} = "{stiffness.header}" }} in the campaign reads the other'
+    return [f'"{stiffness.header}" beside the damping "{loss.header}" is read as {meaning}; {choice}']
 
 
 def _moves_along(table: Table, first: Column, second: Column) -> bool:

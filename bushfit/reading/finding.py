@@ -72,7 +72,8 @@ def find_table(
         raise MeasurementError(problem, file=opened.file, found=f"header_line = {header_line}", hint=hint)
     if len(table.headers) < 2:
         expected = f"{_EXPECTED_HEADER}, separated by comma, semicolon, tab, | or blanks"
-        raise table.header_error("there is only one column", expected=expected)
+        hint = "if it was copied from a PDF cell by cell, copy it again as a table, or write each row on one line"
+        raise table.header_error("there is only one column", expected=expected, hint=hint)
     if table.layout.headerless and not any(text.isdecimal() for text in columns.values()):
         hint = f"state the numbers of the columns and their units in the campaign: {_NUMBERED_COLUMNS}"
         raise table.header_error("there is no header", found=None, expected=_EXPECTED_HEADER, hint=hint)

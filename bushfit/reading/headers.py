@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from types import MappingProxyType
-from typing import Literal
+from typing import Literal, TypeVar, get_args
 
 from bushfit import units
 
@@ -24,7 +24,7 @@ def _expand(name: str) -> list[str]:
         return [name]
     words = {
         **WORDS["parts"],
-        "displacement": WORDS["loop"]["displacement"],
+        **{role: WORDS["loop"][role] for role in ("displacement", "force")},
         "strain": WORDS["straining"]["displacement"],
     }
     return [full for word in words[part[1]] for full in _expand(name.replace(part[0], word, 1))]
@@ -58,12 +58,15 @@ ROW_COLUMNS = {
 }
 #: Convention by which an amplitude is stated.
 AmplitudeConvention = Literal["zero-to-peak", "peak-to-peak", "rms"]
+#: Largest or smallest value in each cycle of an oscillating quantity.
+Extreme = Literal["maximum", "minimum"]
 #: Factor that converts an amplitude to zero-to-peak, by its convention.
 ZERO_TO_PEAK: dict[AmplitudeConvention, float] = {"zero-to-peak": 1.0, "peak-to-peak": 0.5, "rms": 2.0**0.5}
 #: Text of each amplitude convention in the header of an added column.
 COUNTED: dict[AmplitudeConvention | None, str] = {
     "peak-to-peak": " p-p", "zero-to-peak": " 0-p", "rms": " rms", None: ""
 }  # fmt: skip
+Meant = TypeVar("Meant")
 #: Starts of the names of an angular frequency.
 _ANGULAR = ("angular", "angfreq", "omega", "ω", "kreisfrequenz", "pulsa", "角频率")
 #: Channel of a test rig in brackets: "Load(Linear:Load) (kN)".
@@ -102,7 +105,7 @@ _FOOTNOTES = str.maketrans("", "", "\u00b9\u00b2\u00b3\u2070\u2074\u2075\u2076\u
 #: Units with which the symbol f cannot mean a role, by role.
 _UNITS_NOT_F = {"force": ("Hz",), "frequency": ("N", "N m")}
 #: Roles that a column without a unit does not have, whatever its name.
-_NEEDING_UNITS = ("damping_coefficient", "force_amplitude")
+_NEEDING_UNITS = ("damping_coefficient", "force_amplitude", "energy", "preload")
 #: Units with which a short or ambiguous name means a role, by name and role.
 _UNITS_OF = {
     (name, role): si
@@ -122,6 +125,10 @@ _CONVENTION_KEYS: dict[str, AmplitudeConvention] = {
 _CONVENTIONS = [
     (re.compile("|".join(WORDS["conventions"][key]).format(**_PARTS)), convention)
     for key, convention in _CONVENTION_KEYS.items()
+]
+#: Patterns of the largest and smallest value of a cycle, from which an amplitude is computed.
+_EXTREMES: list[tuple[re.Pattern[str], Extreme]] = [
+    (re.compile("|".join(WORDS["conventions"][extreme]).format(**_PARTS)), extreme) for extreme in get_args(Extreme)
 ]
 #: Boundary of words in "AmpPkPk".
 _CAMEL = re.compile(r"(?<=[a-z]{2})(?=[A-Z])")
@@ -150,12 +157,14 @@ class Heading:
         unit: unit as written in the file or campaign; None if there is none.
         convention: convention of an amplitude; None if neither header nor unit states it.
         logarithm: base of the logarithm if the column contains logarithms; 0 for plain values, NaN for an unknown base.
+        extreme: largest or smallest value of each cycle; half of their difference is the amplitude, which is the role.
     """
 
     role: str
     unit: str | None = None
     convention: AmplitudeConvention | None = None
     logarithm: float = 0.0
+    extreme: Extreme | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -166,11 +175,18 @@ class Column(Heading):
         header: text of the header cell.
         index: position of the column, from 0.
         scale: factor from the unit to SI.
+        subtracted: position of a column to be subtracted from this one, as minima from maxima; None without one.
     """
 
     header: str
     index: int
     scale: float = 1.0
+    subtracted: int | None = None
+
+    @property
+    def indices(self) -> tuple[int, ...]:
+        """Positions of the columns that contain its numbers."""
+        return (self.index,) if self.subtracted is None else (self.index, self.subtracted)
 
 
 class Vocabulary:
@@ -236,26 +252,32 @@ class Vocabulary:
             return Heading(self._stated[plain(header)], None if unit == name else unit, counting, logarithm)
         # try the header without, then with the words of its convention
         without, convention = split_convention(text)
-        for name, unit, certain in (split for form in dict.fromkeys((without, text)) for split in _splits(form)):
+        without, extreme = (without, None) if convention else split_extreme(text)
+        forms = dict.fromkeys((without, text))
+        for is_first, (name, unit, certain) in ((form is without, one) for form in forms for one in _splits(form)):
+            is_extreme = extreme is not None and is_first
             if unit is None and name.endswith(("%", "‰", "°")):
                 continue  # the unit without a bracket
-            bare = plain(name)
+            bare, without_asides = plain(name), plain(_ASIDES.sub("", _folded(name)))
             implied: AmplitudeConvention | None = "peak-to-peak" if bare in PEAK_TO_PEAK_NAMES else convention
-            amplitudes = [bare + "amplitude"] * bool(implied) + ["amplitude"] * (bare in PEAK_TO_PEAK_NAMES)
+            amplitudes = [word + "amplitude" for word in (bare, without_asides) if implied or extreme]
+            amplitudes += ["amplitude"] * (bare in PEAK_TO_PEAK_NAMES)
             without_mean = plain(_MEANS.sub("", _folded(name)))
             for word in (
                 bare,
-                plain(_ASIDES.sub("", _folded(name))),
+                without_asides,
                 *([without_mean] if _OF_MEANS.intersection(self._roles.get(without_mean, ())) else []),
                 *amplitudes,
                 *self._names_with_symbol(name, unit),
             ):
                 for role in self._roles.get(word, ()):
+                    if extreme and role not in (("amplitude", "force_amplitude") if is_extreme else ("time",)):
+                        continue  # "min" is no unit but of a time
                     is_unit = units.is_unit if role != "temperature" else units.kelvin_scale
                     column_unit = unit or (unit_below and parse_unit(unit_below)[0]) or unit_below
                     fitting = role in self._stated_units or fits(word, role, column_unit)
                     if (certain or is_unit(unit or "")) and fitting:
-                        return Heading(role, unit, implied, logarithm)
+                        return Heading(role, unit, implied, logarithm, extreme if is_extreme else None)
         return None
 
     def _names_with_symbol(self, name: str, unit: str | None) -> Iterator[str]:
@@ -304,11 +326,21 @@ def is_angular(header: str, unit: str) -> bool:
 @lru_cache(maxsize=4096)
 def split_convention(text: str) -> tuple[str, AmplitudeConvention | None]:
     """Split "amplitude p-p [mm]" into "amplitude [mm]" and "peak-to-peak"; None for a text without a convention."""
+    return _split_off(text, _CONVENTIONS)
+
+
+def split_extreme(text: str) -> tuple[str, Extreme | None]:
+    """Split "Disp max [mm]" into "Disp [mm]" and "maximum"; None for a text without such a word."""
+    return _split_off(text, _EXTREMES)
+
+
+def _split_off(text: str, patterns: Sequence[tuple[re.Pattern[str], Meant]]) -> tuple[str, Meant | None]:
+    """Split a text into the part that matches no pattern, and the meaning of the first matching pattern, or None."""
     for form in dict.fromkeys((text, _CAMEL.sub(" ", text))):
-        for pattern, convention in _CONVENTIONS:
+        for pattern, meaning in patterns:
             if match := pattern.search(_folded(form)):
                 rest = form[: match.start()] + " " + form[match.end() :]
-                return _EMPTY_BRACKETS.sub("", _DANGLING.sub("", rest)).strip(), convention
+                return _EMPTY_BRACKETS.sub("", _DANGLING.sub("", rest)).strip(), meaning
     return text.strip(), None
 
 

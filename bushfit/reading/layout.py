@@ -13,7 +13,9 @@ from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
-from typing import Literal, NamedTuple
+from typing import Annotated, Literal, NamedTuple
+
+from pydantic import BeforeValidator
 
 from bushfit import units
 from bushfit.reading.headers import WORDS, Vocabulary, plain, split_convention, split_unit
@@ -23,6 +25,11 @@ from bushfit.reading.numerals import is_like_number
 _SUMMARIES = frozenset(map(plain, WORDS["rows_of"]["summary"]))
 #: Characters that separate columns, by their names in a campaign, in the order in which they are tried.
 DELIMITERS = {"semicolon": ";", "tab": "\t", "pipe": "|", "comma": ",", "caret": "^", "blanks": " "}
+#: Signs in numbers by the words for them.
+SIGNS = {"point": ".", "comma": ",", "blank": " ", "apostrophe": "'"}
+#: Validators that replace the word for a sign in numbers by the sign, and the sign of a delimiter by its word.
+_SIGN = BeforeValidator(lambda raw: SIGNS.get(raw, raw) if isinstance(raw, str) else raw)
+_WORD = BeforeValidator(lambda raw: next((word for word, sign in DELIMITERS.items() if sign == raw), raw))
 #: Non-empty lines at the start of a file that are searched for the header; chosen: far more than preambles have.
 MOST_HEAD_LINES = 500
 #: Largest number of columns of a table; chosen: far more than a test has.
@@ -71,17 +78,17 @@ class FileFormat:
 
     Args:
         encoding: Python's name of the text encoding, such as "cp1252".
-        delimiter: name of the character between cells.
-        decimal: decimal mark of the numbers.
+        delimiter: name of the character between cells; a campaign may state the character itself.
+        decimal: decimal mark of the numbers; a campaign may state the words "point" and "comma".
         thousands: thousands separator of the numbers.
         header_line: number of the line, or row of a workbook, with the column names, from 1.
         sheet: name of the sheet of a workbook, or of the group of channels of a recording.
     """
 
     encoding: str | None = None
-    delimiter: Literal["comma", "semicolon", "tab", "pipe", "caret", "blanks"] | None = None
-    decimal: Literal[".", ","] | None = None
-    thousands: Literal[".", ",", " ", "'", "none"] | None = None
+    delimiter: Annotated[Literal["comma", "semicolon", "tab", "pipe", "caret", "blanks"] | None, _WORD] = None
+    decimal: Annotated[Literal[".", ","] | None, _SIGN] = None
+    thousands: Annotated[Literal[".", ",", " ", "'", "none"] | None, _SIGN] = None
     header_line: int | None = None
     sheet: str | None = None
 
@@ -258,7 +265,8 @@ def _first_rows(lines: Sequence[Line], delimiters: Sequence[str]) -> tuple[int, 
     for index in (index for index, line in enumerate(lines) if not is_comment(line.content, ";")):
         last.append(index)
         three = [lines[place].content for place in last]
-        fitting = [mark for mark in delimiters if all(is_row(split(content, mark)) for content in reversed(three))]
+        marks = [mark for mark in delimiters if mark != " " or not all("\t" in content for content in three)]
+        fitting = [mark for mark in marks if all(is_row(split(content, mark)) for content in reversed(three))]
         if len(three) == 3 and fitting:
             return last[0], fitting
     return len(lines), delimiters

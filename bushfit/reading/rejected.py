@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from itertools import islice
+from itertools import islice, pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -91,6 +91,14 @@ def note_left_out(table: Table, rows: Sequence[FaultyRow], count: int) -> Iterat
         MeasurementError: so many of these rows look like data that the meaning of the table is in doubt.
     """
     left_out = [row for row in rows if not table.layout.is_repeated([str(cell) for cell in row[1]])]
+    if broken := _broken_rows(table, left_out):
+        raise table.error(
+            "rows are broken over two lines each",
+            line=broken[0][0],
+            found=", ".join(f"lines {first} and {second}" for first, second in broken[:_MOST_LISTED]),
+            expected=f"the {len(table.headers)} cells of a row on one line",
+            hint="join these lines; a table that was copied from a PDF often breaks so",
+        )
     in_doubt = [row for row in left_out if row[2] in ("doubtful", "word")]
     is_much = len(in_doubt) > _MOST_WORDS or sum(fault == "doubtful" for *_, fault in in_doubt) > 1
     if is_much and len(in_doubt) > _MOST_LEFT_OUT * count:
@@ -103,6 +111,17 @@ def note_left_out(table: Table, rows: Sequence[FaultyRow], count: int) -> Iterat
         ]
         more = ", ..." if len(left_out) > _MOST_LISTED else ""
         yield f"{len(left_out)} row{'s' * (len(left_out) > 1)} left out, without data: {', '.join(listed)}{more}"
+
+
+def _broken_rows(table: Table, rows: Sequence[FaultyRow]) -> list[tuple[int, int]]:
+    """Find rows that are broken over two lines: line numbers of successive lines whose cells together are one row."""
+    filled = [(line, sum(map(is_like_number, map(str, cells)))) for line, cells, fault in rows if fault == "doubtful"]
+    pairs = list[tuple[int, int]]()
+    for (first, count), (second, rest) in pairwise(filled):
+        is_used = bool(pairs) and pairs[-1][1] == first
+        if second == first + 1 and count + rest == len(table.headers) and not is_used:
+            pairs.append((first, second))
+    return pairs if len(pairs) > 1 else []
 
 
 def bad_row(

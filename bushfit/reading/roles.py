@@ -36,5 +36,7 @@ def si_unit(role: str, motion: Motion) -> str:
         return "Pa*s" if motion is STRAINING else motion.stiffness_unit.replace("/", "*s/", 1)
     if role.endswith("compliance"):
         return {"N/m": "m/N", "Pa": "1/Pa"}.get(motion.stiffness_unit, "rad/N/m")
+    if role == "energy":  # per cycle, in a test of strain per volume
+        return "Pa" if motion is STRAINING else "J"
     unit = _UNITS.get(role, "1")
     return str(getattr(motion, unit, unit))

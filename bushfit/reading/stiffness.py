@@ -26,8 +26,6 @@ _AGREEMENT = 0.02
 #: Next steps for quantities from which the user can compute a column, by kind of quantity.
 _WAYS_ON = {
     "decrement": 'divide the logarithmic decrement by pi, and write the quotient as "loss factor [-]" into the file',
-    "extremes": 'write half of maximum minus minimum as "amplitude [mm]" and "force amplitude [N]" into the file',
-    "energy": 'write the energy over (pi times the squared amplitude) as "loss stiffness [N/mm]" into the file',
     "period": 'write the reciprocal of the period as "frequency [Hz]" into the file',
     "quality": 'write the reciprocal of the quality factor as "loss factor [-]" into the file',
 }
@@ -117,6 +115,7 @@ def with_positive_loss(
         corrected["phase"] = np.angle(-np.exp(1j * phase)) if automatic or test.force_sign == -1 else phase
     size = np.median(values.get("storage_stiffness", values.get("stiffness", np.ones(1))))
     sizes = {"loss_stiffness": size, "loss_compliance": np.median(values.get("storage_compliance", np.ones(1)))}
+    sizes["energy"] = np.median(np.abs(values.get("energy", np.ones(1))))
     for role in ("phase", "loss_factor", "damping_coefficient", "damping_ratio", *sizes):
         if role not in corrected or role not in columns:
             continue
@@ -136,11 +135,12 @@ def complex_stiffness(pair: tuple[str, str], values: Mapping[str, Floats]) -> tu
 
     Args:
         pair: roles of the two columns, such as ("stiffness", "loss_factor").
-        values: values in SI by role, (n,) each; also "amplitude" for a force amplitude, and "frequency" for a damping
-            coefficient.
+        values: values in SI by role, (n,) each; also "amplitude" for a force amplitude or an energy, and "frequency"
+            for a damping coefficient.
 
     Notes:
-        K* = K' + i K'' with K'' = 2 pi f c of a damping coefficient c, and tan delta = 2 zeta of a damping ratio zeta.
+        K* = K' + i K'' with K'' = 2 pi f c of a damping coefficient c, K'' = W / (pi x^2) of an energy W that is
+        dissipated in a cycle of amplitude x, and tan delta = 2 zeta of a damping ratio zeta.
         A force amplitude F at a displacement amplitude x gives |K*| = F / x. A complex compliance J' - i J'' is the
         reciprocal of the stiffness. The loss factor is NaN from a phase of 90 deg on.
     """
@@ -151,8 +151,11 @@ def complex_stiffness(pair: tuple[str, str], values: Mapping[str, Floats]) -> tu
         size = 1.0 / size
     if pair[0] == "force_amplitude":
         size = size / values["amplitude"]
-    if pair[1] in ("loss_stiffness", "damping_coefficient"):
-        loss = loss * (2.0 * np.pi * values["frequency"] if pair[1] == "damping_coefficient" else 1.0)
+    if pair[1] in ("loss_stiffness", "damping_coefficient", "energy"):
+        if pair[1] == "damping_coefficient":
+            loss = 2.0 * np.pi * values["frequency"] * loss
+        elif pair[1] == "energy":
+            loss = loss / (np.pi * values["amplitude"] ** 2)
         storage = size if pair[0] == "storage_stiffness" else np.sqrt(size**2 - loss**2)
         return storage + 1j * loss, loss / storage
     factor = 2.0 * loss if pair[1] == "damping_ratio" else loss

@@ -14,7 +14,8 @@ from bushfit.geometry import Place, strain_factor_of_files
 from bushfit.reading.finding import find_table
 from bushfit.reading.headers import SWEEP_COLUMNS, ZERO_TO_PEAK, AmplitudeConvention, Column
 from bushfit.reading.labelled import Rows, column_texts, note_not_understood
-from bushfit.reading.measurement import SAME_TEMPERATURE, Floats, Sweep
+from bushfit.reading.levels import find_levels, read_condition
+from bushfit.reading.measurement import Floats, Sweep
 from bushfit.reading.parts import OpenedFile
 from bushfit.reading.preload import parse_preload
 from bushfit.reading.rejected import check_positive
@@ -31,8 +32,6 @@ _FEWEST_SWEEP_ROWS = 3
 _MOST_REPEATS = 1_000_000
 #: Relative difference up to which a stated amplitude or frequency agrees with its column; chosen: rigs miss by less.
 _STATED_AGREEMENT = 0.1
-#: Largest range of temperatures in one test [K]; chosen: rubber warms up by as much during a test.
-ONE_TEST = 5.0
 _HINTS = {
     "amplitude": 'or state at_amplitude = "0.1 mm" if all rows have it',
     "frequency": 'or state at_frequency = "10 Hz" if all rows have it',
@@ -99,9 +98,15 @@ def read_sweep(
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         stiffness, loss_factor = complex_stiffness(pair, values)
     check_stiffness(table, pair, columns, values, stiffness, loss_factor)
-    selected, temperature, degrees = _rows_at_temperature(table, values, direction, test.temperature)
+    frequency = values["frequency"]
+    selected, degrees = _rows_of_test(table, "temperature", np.arange(frequency.size), direction, test)
+    selected, _ = _rows_of_test(table, "preload", selected, direction, test)
+    kelvin = test.temperature if degrees is None else degrees[selected] + si.CELSIUS
+    temperature = test.temperature
+    if degrees is not None and temperature is None:
+        temperature = round(float(degrees[selected].mean()), 2) + si.CELSIUS
     repeat = _repeat_numbers(table, values)
-    frequency, amplitude = values["frequency"][selected], values["amplitude"][selected]
+    frequency, amplitude = frequency[selected], values["amplitude"][selected]
     reached = values["amplitude_reached"][selected] if "amplitude_reached" in values else None
     runs = runs_of(frequency, amplitude, None if repeat is None else repeat[selected], test.stepped)
     if reached is None and not np.array_equal(runs.amplitude, amplitude):
@@ -120,7 +125,7 @@ def read_sweep(
         runs.stepped,
         values["relative_error"][selected] if "relative_error" in values else None,
         weight=test.weight,
-        temperature=degrees,
+        temperature=kelvin,
         preload=parse_preload(test.preload, direction),
     )
 
@@ -142,8 +147,7 @@ def sweep_columns(
         convention: convention of the amplitudes; None if the campaign does not state it.
 
     Returns:
-        Columns by role: the needed ones, those of other pairs if their units fit, and optional ones. A temperature is
-        not converted to K.
+        Columns by role: the needed ones, those of other pairs if their units fit, and optional ones.
 
     Raises:
         MeasurementError: a column is missing, or the convention of an amplitude is unknown or contradictory.
@@ -154,7 +158,6 @@ def sweep_columns(
     wanted = [role for role in ("frequency", "amplitude") if role in roles or role not in constants] + [*pair]
     wanted += [role for role in ("amplitude_reached", "relative_error") if role in roles]
     wanted += ["repeat"] if "repeat" in numeric else []
-    wanted += ["temperature"] if "temperature" in numeric and roles["temperature"].unit else []
     redundant = (role for other_pair in AGREEING_PAIRS if set(other_pair) <= set(roles) for role in other_pair)
     wanted += [role for role in redundant if table.agrees(role, si_unit(role, direction.motion))]
     columns = {role: si_column(table, role, direction, _HINTS.get(role)) for role in wanted}
@@ -181,54 +184,58 @@ def sweep_columns(
     for role in ("amplitude", "amplitude_reached", "force_amplitude"):
         if column := columns.get(role):
             columns[role] = replace(column, scale=ZERO_TO_PEAK[column.convention or convention] * column.scale)
-    return {"temperature": roles["temperature"], **columns} if "temperature" in numeric else columns
+    return columns
 
 
-def _rows_at_temperature(
-    table: Table, values: Mapping[str, Floats], direction: Place, temperature: float | None
-) -> tuple[NDArray[np.intp], float | None, Floats | float | None]:
-    """Select the rows of a sweep at the temperature of the test.
+def _rows_of_test(
+    table: Table, role: str, rows: NDArray[np.intp], place: Place, test: SweepFile
+) -> tuple[NDArray[np.intp], Floats | None]:
+    """Select the rows of a sweep at the temperature or preload of the test.
 
     Args:
-        table: table of the sweep, for errors.
-        values: values in SI by role such as "frequency", (n,) each.
-        direction: direction of the bushing, or the specimen.
-        temperature: temperature that the campaign states [K]; None if it states none.
+        table: table of the sweep.
+        role: "temperature" or "preload".
+        rows: indices of the rows to select from, (n,).
+        place: direction of the bushing, or the specimen.
+        test: table [[sweeps]] of the campaign.
 
     Returns:
-        Indices of the rows; temperature of the test [K], as stated or else the mean of the rows, None if unknown; and
-        temperature of each row [K], None if unknown.
+        Indices of the selected rows; and the temperature [degC] or preload of all rows in the unit of the file, None
+        without a column.
 
     Raises:
-        MeasurementError: the file has several temperatures and none is stated, or too few rows are near the stated one.
+        MeasurementError: the file has several temperatures or preloads, and none is stated, or too few rows are near
+            the stated one.
     """
-    rows = np.arange(values["frequency"].size)
-    if "temperature" not in values:
-        return rows, temperature, temperature
-    unit = table.roles["temperature"].unit
-    if unit is None and temperature is None and np.ptp(values["temperature"]) <= ONE_TEST:
-        return rows, None, None
-    column = si_column(table, "temperature", direction)
-    kelvin = values["temperature"] + (si.kelvin_scale(unit or "") or (1.0, 0.0))[1]
-    if temperature is None and np.ptp(kelvin) <= ONE_TEST:
-        return rows, round(float(kelvin.mean()) - si.CELSIUS, 2) + si.CELSIUS, kelvin
-    problem, expected = "this file contains tests at several temperatures", "one temperature"
-    if temperature is not None:
-        rows = np.flatnonzero(np.abs(kelvin - temperature) <= SAME_TEMPERATURE)
-        if rows.size >= _FEWEST_SWEEP_ROWS:
-            return rows, temperature, kelvin[rows]
-        problem = "too few rows are near the stated temperature"
-        degrees = f"{temperature - si.CELSIUS:.4g} degC"
-        expected = f"{_FEWEST_SWEEP_ROWS} rows or more within {SAME_TEMPERATURE:g} K of {degrees}"
-    ordered = np.sort(kelvin) - si.CELSIUS
-    means = [part.mean() for part in np.split(ordered, np.flatnonzero(np.diff(ordered) > SAME_TEMPERATURE) + 1)]
-    nearest = min(means, key=lambda mean: abs(mean + si.CELSIUS - (temperature or 0.0)))
+    condition = read_condition(table, role, place.motion)
+    if condition is None:
+        return rows, None
+    levels, stated, tolerance = find_levels(table, condition, rows), None, condition.step
+    if role == "temperature" and test.temperature is not None:
+        stated = test.temperature - si.CELSIUS
+    elif role == "preload" and len(levels) > 1 and (preload := parse_preload(test.preload, place)):
+        is_same = si.is_compatible(condition.unit, preload.unit)
+        stated = preload.value / si.si_factor(condition.unit, preload.unit) if is_same else np.nan
+        tolerance /= 2.0
+    if stated is None and len(levels) == 1:
+        return levels[0], condition.values
+    problem, expected, nearest = f"this file contains tests at several {role}s", f"one {role}", levels[0]
+    if stated is not None:
+        selected = rows[np.abs(condition.values[rows] - stated) <= tolerance]
+        if selected.size >= _FEWEST_SWEEP_ROWS:
+            return selected, condition.values
+        problem = f"too few rows are near the stated {role}"
+        unit = "K" if condition.unit == "degC" else condition.unit
+        expected = f"{_FEWEST_SWEEP_ROWS} rows or more within {tolerance:g} {unit} of {stated:.4g} {condition.unit}"
+        levels = condition.groups(rows)
+        nearest = min(levels, key=lambda level: abs(condition.values[level].mean() - stated))
     raise table.error(
         problem,
-        column=column,
-        found=", ".join(f"{mean:.1f}" for mean in means) + " degC",
+        column=condition.column,
+        found=", ".join(condition.text(level).removesuffix(f" {condition.unit}") for level in levels)
+        + f" {condition.unit}",
         expected=expected,
-        hint=f'state temperature = "{nearest:.1f} degC" in the campaign; several tests may name one file',
+        hint=f'state {role} = "{condition.text(nearest)}" in the campaign; several tests may name one file',
     )
 
 

@@ -303,13 +303,19 @@ class Table:
             MeasurementError: ambiguous numbers, too few rows, or so many rows without data that the meaning of the
                 table is in doubt.
         """
-        table, left_out = self.needing(wanted), list[FaultyRow]()
+        table, left_out, requested = self.needing(wanted), list[FaultyRow](), wanted
+        subtracted = {
+            f"{role} subtracted": replace(column, index=column.subtracted)
+            for role, column in wanted.items()
+            if column.subtracted is not None
+        }
+        wanted = {**wanted, **subtracted}
         parts = [part for block in table.blocks() for part in table._read_block(block, wanted, left_out)]
         if left_out:
             refuse_other_columns(table, left_out, Vocabulary(of_motion(self.names, self.motion)))
         values = {role: np.concatenate([np.empty(0), *(part.pop(role) for part in parts)]) for role in wanted}
         if mark_missing(table, wanted, values):
-            return self.read(wanted, fewest_rows=fewest_rows)
+            return self.read(requested, fewest_rows=fewest_rows)
         count = len(next(iter(values.values())))
         notes = (*self.notes, *self.remarks, *note_left_out(table, left_out, count))
         if count < fewest_rows:
@@ -325,11 +331,13 @@ class Table:
             if column.logarithm:
                 with np.errstate(over="ignore"):
                     values[role] = column.scale * column.logarithm ** (values[role] / column.scale)
+        for role in subtracted:
+            values[role.removesuffix(" subtracted")] -= values.pop(role)
         return values, notes
 
     def needing(self, wanted: Mapping[str, Column]) -> "Table":
         """Copy of the table in which only rows with a number in each wanted column are data."""
-        return replace(self, needed=self.needed | {column.index for column in wanted.values()})
+        return replace(self, needed=self.needed.union(*(column.indices for column in wanted.values())))
 
     def refuse(
         self, bad: NDArray[np.bool_], column: Column, problem: str, expected: str, hint: str | None = None

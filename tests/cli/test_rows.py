@@ -86,6 +86,33 @@ def test_parts_are_a_batch(typed, points, tmp_path):
     refused(asked, tmp_path / "f", "tests of several parts", 'specimen_number = "..."')
 
 
+@pytest.mark.parametrize(
+    ("header", "levels", "stated", "plural"),
+    [
+        ("T [°C]", (-30, 23, 80), [f'temperature = "{level}.0 degC"' for level in (-30, 23, 80)], "temperatures"),
+        ("Vorlast [N]", (0, 500, 1000), [f'preload = "{level} N"' for level in (0, 500, 1000)], "preloads"),
+        ("Static deflection (mm)", (1, 2, 4), [f'preload = "{level} mm"' for level in (1, 2, 4)], "preloads"),
+    ],
+)
+def test_temperatures_and_preloads_are_tests_of_their_own(typed, points, tmp_path, header, levels, stated, plural):
+    rows = [
+        (level, *row[:2], row[2] * (1 + k / 10), row[3]) for k, level in enumerate(levels) for row in points["axial"]
+    ]
+    export(tmp_path / "axial.csv", (header, *HEADERS), rows)
+    typed("init", "axial.csv", *GEOMETRY, "-o", "x")
+    text = (tmp_path / "x/campaign.toml").read_text(encoding="utf-8")
+    assert [line for line in text.splitlines() if line in stated] == stated
+    sweeps = load_campaign(tmp_path / "x/campaign.toml").sweeps
+    first = 1e3 * np.array([row[2] for row in points["axial"]])
+    for k, sweep in enumerate(sweeps):
+        assert np.abs(sweep.stiffness) == pytest.approx(first * (1 + k / 10))
+    assert len({sweep.name for sweep in sweeps}) == len(levels)
+    (tmp_path / "c.toml").write_text(
+        f'{BUSHING}[[sweeps]]\nfile = "axial.csv"\ndirection = "axial"\n', encoding="utf-8"
+    )
+    refused(typed("fit", "c.toml", "-o", "y", status=2), tmp_path / "y", f"tests at several {plural}", stated[0])
+
+
 @pytest.mark.parametrize(("ending", "delimiter"), [("csv", ","), ("csv", ";"), ("xlsx", "")])
 def test_runs_are_repeats(typed, points, tmp_path, ending, delimiter):
     """A row that begins with #1 is no comment where all do."""
