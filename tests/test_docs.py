@@ -97,25 +97,6 @@ def test_recipes_for_ci_are_valid_and_run_what_there_is(root):
         batch.make_context("batch", arguments, parent=above)
 
 
-def test_the_page_on_diagnose_has_every_constant_that_moves_a_verdict(root):
-    """With its value; those that follow from others aside."""
-    source = ast.parse((root / "bushfit/diagnosis/priors.py").read_text(encoding="utf-8"))
-    stated: dict[str, list[float]] = {}
-    for line in source.body:
-        if isinstance(line, ast.Assign) and "NAMED)" not in ast.unparse(line.value):
-            (target,) = line.targets
-            several = isinstance(target, ast.Tuple)
-            names = target.elts if isinstance(target, ast.Tuple) else [target]
-            values = line.value.elts if several and isinstance(line.value, ast.Tuple) else [line.value]
-            for name, value in zip(names, values, strict=True):
-                numbers = [part.value for part in ast.walk(value) if isinstance(part, ast.Constant)]
-                stated[ast.unparse(name)] = sorted(number for number in numbers if not isinstance(number, str))
-    page = (root / "bushfit/manual/diagnosis.md").read_text(encoding="utf-8")
-    rows = re.findall(r"^\| `([A-Z_]+)` \| ([^|]+) \|", page, re.MULTILINE)
-    assert {name: sorted(map(float, re.findall(r"[\d.]+", cell))) for name, cell in rows} == stated
-    assert len(stated) <= 20
-
-
 def test_the_map_of_the_code_is_the_code(root):
     """Every module and folder of the package, in the order in which they may import."""
     (tree,) = (block for block in blocks(root / "bushfit/README.md", "text") if block.startswith("bushfit/\n"))

@@ -142,24 +142,3 @@ def test_a_deviation_of_the_compound_is_part_of_the_covariance(seed):
     ):
         over_sizes = logsumexp([evidence(bent, each) for each in added]) - np.log(SIZES.size)
         assert found == pytest.approx(over_sizes, abs=1e-6)
-
-
-@pytest.mark.parametrize("number", [0, 1])
-def test_amounts_are_those_of_a_dense_posterior(number):
-    """By Gaussian conditioning at each node within the class and each size, mixed by their evidence."""
-    of = ledger(9)
-    group, log_weights, means, seconds = of.groups[number], [], [], []
-    for node in (node for node in of.rig.cases if not node.wide):
-        for size in SIZES:
-            whole = covariance(of, node) + size**2 * group.columns.T @ group.columns
-            inverse, own = np.linalg.inv(whole), of.jacobian[of.precision == 0.0]
-            beside = inverse - inverse @ own.T @ np.linalg.inv(own @ inverse @ own.T) @ own @ inverse
-            log_weights.append(node.log_weight + restricted(of, whole))
-            means.append(-(size**2) * group.columns @ beside @ of.residual)
-            spread = size**2 * np.eye(2) - size**4 * group.columns @ beside @ group.columns.T
-            seconds.append(spread + np.outer(means[-1], means[-1]))
-    share = np.exp(log_weights - logsumexp(log_weights))
-    expected = share @ np.array(means)
-    mean, spread = of.amounts(number)
-    assert mean == pytest.approx(expected, rel=1e-5)
-    assert spread == pytest.approx(np.einsum("k,kij->ij", share, seconds) - np.outer(expected, expected), rel=1e-5)

@@ -14,13 +14,12 @@ from fits import joint_fit
 from tries import SEEDS
 
 from bushfit.campaign.campaign import Campaign
-from bushfit.campaign.schema import UNSTATED, FitSettings, ParameterSetting, RigSettings
+from bushfit.campaign.schema import UNSTATED, RigSettings
 from bushfit.campaign.simulated import SimulateSettings
-from bushfit.errors import FitError
 from bushfit.fitting.levels import level_errors
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.problem import FitProblem
-from bushfit.fitting.procedures import fit_dynamic, fit_joint, fit_static, fit_two_step
+from bushfit.fitting.procedures import fit_dynamic, fit_joint, fit_two_step
 from bushfit.geometry import Direction
 from bushfit.model.model import FIVE, Model
 from bushfit.model.result import Result
@@ -98,13 +97,6 @@ def test_errors_of_held_parameters_are_carried_over(measured, result):
         alone = sharp.covariance.stderr(name)
         assert carried.covariance.stderr(name) > 1.1 * alone  # type: ignore[operator]
         assert alone < most * sharp.model.values[name]  # type: ignore[operator]
-
-
-def test_missing_tests_are_said(measured, result):
-    with pytest.raises(FitError, match="fit-static needs a loop"):
-        fit_static(PreparedCampaign.from_campaign(replace(measured.campaign, loops=())))
-    with pytest.raises(FitError, match="fit-dynamic needs a sweep"):
-        fit_dynamic(PreparedCampaign.from_campaign(replace(measured.campaign, sweeps=())), result)
 
 
 def covered(result: Result, truth: Mapping[str, float]) -> list[bool]:
@@ -217,13 +209,3 @@ def test_errors_of_levels_are_told(rig, paper_model, error):
     assert np.mean(matters) >= 0.95 if error else np.mean(matters) <= 0.05
     print(f"degrees of freedom {min(freedom)} to {max(freedom)}")
     assert not error or 2 <= min(freedom) <= max(freedom) < 6  # six levels, less what the parameters take
-
-
-def test_held_and_bounded_parameters(measured):
-    settings = {"alpha": ParameterSetting(value=0.3, vary=False), "mu": ParameterSetting(max=1.05e6)}
-    result = joint_fit(replace(measured.campaign, fit=FitSettings(parameters=settings)))
-    assert result.model.values["alpha"] == 0.3
-    assert "alpha" not in result.fitted
-    assert result.covariance.stderr("alpha") is None
-    assert result.model.values["mu"] <= 1.05e6
-    assert any(line.startswith("mu is at the max given in [fit]") for line in result.warnings)

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bushfit.errors import ModelError
-from bushfit.geometry import Bushing, Direction
+from bushfit.geometry import Bushing, Direction, Specimen, shared_labels, stiffness_per_modulus, unit_strain
 from bushfit.geometry.shape import RADIUS_RATIO_RANGE, SLENDERNESS_RANGE
 
 RATIOS = (0.1, 0.2, 0.35, 0.5, 0.5556, 0.7, 0.85, 0.93, 0.97)
@@ -80,6 +80,13 @@ def test_strain_and_stiffness_share_one_energy(bushing, direction):
     assert bushing.stiffness_per_modulus(direction) == pytest.approx(stored, rel=1e-12)
 
 
+def test_a_block_in_shear_stores_the_energy_of_its_strain():
+    """e/d = 1/(2 thickness): elements in parallel store k d^2/2."""
+    mount = Specimen("mount", "shear", area=772e-6, thickness=6e-3, elements=2)
+    stored = 2.0 * 772e-6 * 6e-3 * (2.0 * unit_strain(None, mount)) ** 2
+    assert stiffness_per_modulus(None, mount) == pytest.approx(stored, rel=1e-12)
+
+
 @given(shapes)
 def test_radial_strain_is_eq_8(bushing):
     with mpmath.workdps(50):
@@ -131,3 +138,10 @@ def test_beyond_the_shapes_that_were_solved(inner, length):
     assert caught.value.hint
     for a, b in ((0.0015, 0.001), (0.0092, 0.6)):  # the ends of the ranges belong to them
         assert Bushing("tube", a, 0.01, b, "calibrated").correction is not None
+
+
+def test_an_effect_on_the_first_of_two_bodies_is_the_opposite_of_one_on_the_second():
+    bodies = [Specimen.of_bushing(Bushing(name, 0.01, 0.018, 0.034))[:2] for name in ("a", "b", "c")]
+    single = [f"{name} {axis}" for name in "abc" for axis in ("axial", "radial")]
+    assert shared_labels(bodies[0] + bodies[1]) == [*single[:4], "b", "axial", "radial"]
+    assert shared_labels([place for body in bodies for place in body]) == [*single, "a", "b", "c", "axial", "radial"]
