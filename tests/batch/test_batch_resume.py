@@ -5,22 +5,14 @@ import os
 import signal
 import subprocess
 import time
-from concurrent.futures import ProcessPoolExecutor
-from dataclasses import replace
 from functools import partial
-from multiprocessing import get_context
 from pathlib import Path
 
 import pytest
 from trees import PATTERN, command, kept, list_many, stamps, tree, wait_for
 
 from bushfit.batch import store
-from bushfit.batch.document import RowFile
 from bushfit.batch.executor import local_workers, run_rows
-from bushfit.batch.manifest import Row, RowSettings
-from bushfit.batch.row import RowTask
-from bushfit.errors import BatchError
-from bushfit.report.results import Formats
 
 ALL = ("batch", PATTERN, "-o", "all", "--no-plots")
 
@@ -127,16 +119,6 @@ def test_a_worker_that_dies_costs_a_second_try(tmp_path, count, once):
     found = list(run_rows(range(100, 100 + count), task, lambda why: why, local_workers(2)))
     assert sorted(found) == [(number, str(2 * (100 + number))) for number in range(count)], "each row once"
     assert len(list(tmp_path.iterdir())) == len(once)
-
-
-def test_a_worker_of_another_version_or_none_that_lives_ends_the_batch(tmp_path):
-    row = Row("a", "a", "a.toml", "a.toml", RowSettings())
-    task = RowTask(tmp_path, (), Formats(False, False), resume=False, version="0.0.0")
-    with pytest.raises(BatchError, match=r"another bushfit[\s\S]*0\.0\.0"):
-        list(run_rows([row], task, lambda why: (RowFile(status="failed", error=why), False), local_workers(1)))
-    dead = replace(local_workers(2), open=partial(ProcessPoolExecutor, 2, get_context("spawn"), initializer=die))
-    with pytest.raises(BatchError, match="no worker process starts"):
-        list(run_rows([1, 2], str, lambda why: why, dead))
 
 
 def die() -> None:

@@ -1,6 +1,6 @@
 """Campaign files: what they say arrives in SI with the tests they name, in the order in which these were made.
 
-Most of what can be wrong with a campaign stands in cli/spoiled_campaigns.py, with the command that says it.
+Most of what can be wrong with a campaign is in tests/files/spoiled, with the command that says it.
 """
 
 import math

@@ -93,16 +93,6 @@ def test_a_hint_leads_to_what_a_sweep_lacks(typed, tmp_path, header, said, unsai
     assert unsaid not in done.stderr.partition("try:")[2]
 
 
-@pytest.mark.parametrize(
-    "header",
-    ["f [Hz],F [N],amplitude [mm],Steifigkeit dyn. [N/mm],delta [deg]", "f Hz,F in N,ampl mm,dyn. Steifigkeit,eta"],
-)
-def test_the_unit_tells_frequency_from_force(typed, tmp_path, header):
-    unit = ("--unit", "stiffness=N/mm") if "eta" in header else ()
-    done = typed("inspect", *sweeps(tmp_path, header, cells="60,0.1,{},0.2"), "--no-plots", *unit)
-    assert "from 5 to 45 Hz" in done.stderr
-
-
 def test_a_column_is_named_where_it_stands_and_the_text_holds_in_any_folder(typed, tmp_path, root):
     files = sweeps(tmp_path, *(f"f [Hz],{level} [mm],stiffness [N/mm],eta" for level in ("Pegel SS", "amplitude")))
     done = typed("inspect", *files, "--no-plots", "--column", "amplitude=Pegel SS [mm]")

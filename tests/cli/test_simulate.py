@@ -3,7 +3,6 @@
 import json
 import shutil
 
-import numpy as np
 import pandas as pd
 import pytest
 from shell import BUSHING, GEOMETRY, document, names, refused, values
@@ -86,20 +85,3 @@ def test_a_measured_test_becomes_a_sweep(typed, root, tmp_path):
     assert (table["relative error [-]"] < 0.2).all()
     assert table["amplitude [mm]"].max() == pytest.approx(0.0396, rel=0.01)
     assert table["frequency [Hz]"].is_monotonic_increasing
-
-
-def test_other_words_for_the_same_test(typed, root, tmp_path):
-    """As a transmissibility in a German file, with its base stated, and phases that have the opposite sign."""
-    raw = pd.read_csv(root / RESONANCE)
-    ratio = raw["mass_accel_ms2"] / raw["base_accel_ms2"]
-    phase = np.degrees(raw["base_phase_rad"] - raw["mass_phase_rad"])
-    table = pd.DataFrame(
-        {"Frequenz [Hz]": raw["freq_hz"], "Transmissibilität [-]": ratio, "Phasenwinkel [Grad]": phase}
-    )
-    table.to_csv(tmp_path / "axial.csv", sep=";", decimal=",", index=False)
-    typed("reduce", root / RESONANCE, *MASS, "--direction", "axial", "-o", "x", "--no-plots")
-    done = typed("reduce", "axial.csv", "--mass", "0.5878 kg", "--base-acceleration", "1 g", "-o", "y", "--no-plots")
-    assert "have the opposite sign" in done.stderr
-    one, other = (pd.read_csv(tmp_path / name / "sweep.csv") for name in ("x", "y"))
-    assert np.allclose(one["stiffness [N/mm]"], other["stiffness [N/mm]"], rtol=1e-3)
-    assert np.allclose(one["amplitude [mm]"], other["amplitude [mm]"], rtol=0.15)  # the shaker missed 1 g by as much

@@ -68,7 +68,7 @@ def test_a_large_file_reads_like_a_small_one(lead, tmp_path):
     assert np.array_equal(spoiled.force, loop.force[:-1])
 
 
-#: What is wrong, and what the error says besides what tests/cli/spoiled_tables.py has.
+#: What is wrong, and what the error says besides what tests/files/spoiled/tables.toml has.
 BAD_LOOPS: list[tuple[str | bytes, list[str]]] = [
     (b"a\0b\0\0c", ["this is not text"]),
     (LOOP.encode("utf-16")[:-1], ["this is not UTF-16 text"]),
