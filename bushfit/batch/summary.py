@@ -98,6 +98,11 @@ class BatchResult:
         return np.array([bool(describe_poor_fit(record, self.plan.limits)) for record in self.records])
 
     @cached_property
+    def lacks_sweep(self) -> Array:
+        """True for each evaluated part without a sweep if the other parts have one: its fit is not comparable, (n,)."""
+        return np.array([bool(self.curves) and record.status == "done" and not record.curve for record in self.records])
+
+    @cached_property
     def quantities(self) -> dict[str, PartQuantity]:
         """Parameters, and stiffness and loss factor at stated points, by name: what is compared between the parts."""
         return list_quantities(self.estimates, self.plan.task.points)
@@ -134,13 +139,13 @@ class BatchResult:
     def compared_values(self) -> dict[str, tuple[Array, Array]]:
         """Values and standard errors for the comparison of the parts, by name of the quantity, (n,) each.
 
-        Measures of the fit are left out. Values of poor fits and parameters at a bound are NaN, and so are parameters
-        of a model with an unnamed correction, because the parameters contain a part of the gap.
+        Measures of the fit are left out. Values of poor fits, of parts that lack a sweep, and parameters at a bound are
+        NaN, and so are parameters of a model with an unnamed correction, because they contain a part of the gap.
         """
         compared = dict[str, tuple[Array, Array]]()
         for name in (name for name in self.quantities if name in self.estimates and name not in FIT_NAMES):
             value, low, high, stderr = self.estimates[name]
-            is_unknown = self.is_poor | [
+            is_unknown = (self.is_poor | self.lacks_sweep) | [
                 name in record.at_bound or (is_parameter(name) and UNNAMED in record.effects) for record in self.records
             ]
             errors = np.where(np.isfinite(stderr), stderr, (high - low) / (2.0 * Z95))
@@ -210,7 +215,7 @@ class BatchResult:
         """
         values = self.estimates[name][0] * column.factor
         is_known = np.isfinite(values)
-        is_usable = is_known & ~self.is_poor if name not in FIT_NAMES else is_known
+        is_usable = is_known & ~(self.is_poor | self.lacks_sweep) if name not in FIT_NAMES else is_known
         known_values, detectable = values[is_usable if is_usable.any() else is_known], None
         if name in self.compared_values:
             compared = self.compared_values[name][0]
@@ -292,6 +297,8 @@ class BatchResult:
         if poor := [part.name for part in parts if part.poor_fit]:
             judged = "; their limits are judged on measured points, if such points exist" if self.plan.limits else ""
             warnings.append(f"the model misses the tests of {listed(poor)}: do not use their parameters{judged}")
+        if lacking := [part.name for part, lacks in zip(parts, self.lacks_sweep, strict=True) if lacks]:
+            warnings.append(f"no sweep, unlike the other parts, and so not compared with them: {listed(lacking)}")
         warnings += [*self.allowed[1], *self.notes]
         if at_bound:
             clauses = [f"{parameter} of {listed(names)}" for parameter, names in at_bound.items()]

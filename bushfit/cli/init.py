@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -130,7 +130,8 @@ def command(files: tuple[Path, ...], name: str | None, no_input: bool, output: O
     output.write(folder, results, document, files)
     following = f"bushfit {'batch' if len(written) > 1 else 'run'} {quote_path(folder / target)}"
     if any("bushfit reduce" in sentence for sentence in sentences):
-        following = f"bushfit reduce as stated above, then bushfit init again; or, without these tests, {following}"
+        again = "bushfit reduce as stated above, then bushfit init again with each sweep.csv"
+        following = f"{again}; or, without these tests, {following}"
     output.print(f"next: {following}")
 
 
@@ -197,6 +198,7 @@ def inspect_sources(
         raise CampaignError("a file is given twice", found=str(twice[0]), expected="each file once")
     inspections: list[Inspection] = []
     sentences: list[str] = []
+    histories: dict[str, list[TestSource]] = defaultdict(list)
     for source in sources if questions.enabled else track("tests looked at", sources):
         look = partial(inspect_source, source, is_sized=is_sized, is_asking=questions.enabled)
         try:
@@ -209,17 +211,25 @@ def inspect_sources(
         if inspection.kind != "history":
             inspections.append(inspection)
             continue
-        direction = inspection.direction or "..."
-        hint = f"bushfit reduce {quote_path(inspection.file)} --direction {direction} converts it to sweep.csv"
+        direction = str(inspection.direction or "...")
         if source.is_named:
             raise MeasurementError(
                 "this is a raw stepped-sine history, not a sweep",
                 file=inspection.file,
                 expected="hysteresis loops and sweeps",
-                hint=f"{hint}; give sweep.csv instead",
+                hint=f"{_reduce_command(direction, [source])} converts it to sweep.csv; give sweep.csv instead",
             )
-        sentences.append(f"{source}: a raw stepped-sine history; {hint}")
+        histories[direction].append(source)
+    for direction, raw in histories.items():
+        several = f"{len(raw)} raw stepped-sine histories, {direction}"
+        subject, objects = (several, "them") if len(raw) > 1 else (f"{raw[0]}: a raw stepped-sine history", "it")
+        sentences.append(f"{subject}; {_reduce_command(direction, raw)} converts {objects} to sweep.csv")
     return inspections, sentences
+
+
+def _reduce_command(direction: str, histories: Sequence[TestSource]) -> str:
+    """Command that converts raw histories of one direction to one sweep."""
+    return f"bushfit reduce {' '.join(quote_path(source.file) for source in histories)} --direction {direction}"
 
 
 def inspect_source(

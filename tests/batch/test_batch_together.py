@@ -2,6 +2,8 @@
 
 import json
 import math
+from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -11,6 +13,8 @@ from production import COUNT, LOSSY, SOFT
 from scipy import stats
 
 from bushfit.batch.comparison import capability, find_outliers, smallest_deviation
+from bushfit.batch.document import Estimate, RowFile
+from bushfit.batch.summary import BatchResult
 
 
 @pytest.fixture(scope="module")
@@ -85,6 +89,17 @@ def test_a_soft_part_of_ten_is_named():
     assert limit
     assert stats.t.sf(limit, 8) == pytest.approx(0.05 / 2 / 80)
     assert not find_outliers({"0": (values[0], np.where(np.arange(10) == 6, 9.0, 0.1))})[1]["0"].any(), "a large error"
+
+
+def test_a_part_without_the_sweep_of_the_others_is_named_and_not_compared():
+    curve = {f"axial {frequency} Hz 0.1 mm": 5e5 for frequency in (5, 25, 100)}
+    whole = RowFile(status="done", quantities={"mu": Estimate(1e6)}, curve=curve)
+    records = [*[whole] * 6, replace(whole, curve={})]
+    plan: Any = SimpleNamespace(limits=None, task=SimpleNamespace(points=()))
+    result = BatchResult(plan, records, 0, 0.0, ())
+    assert np.flatnonzero(np.isnan(result.compared_values["mu"][0])).tolist() == [6]
+    parts: Any = [SimpleNamespace(name=f"P{number}", poor_fit="", warnings=[]) for number in range(7)]
+    assert result.warnings(parts) == ["no sweep, unlike the other parts, and so not compared with them: P6"]
 
 
 @pytest.mark.parametrize("count", [5, 8, 30])
