@@ -130,7 +130,7 @@ def command(files: tuple[Path, ...], name: str | None, no_input: bool, output: O
     output.write(folder, results, document, files)
     following = f"bushfit {'batch' if len(written) > 1 else 'run'} {quote_path(folder / target)}"
     if any("bushfit reduce" in sentence for sentence in sentences):
-        again = "bushfit reduce as stated above, then bushfit init again with each sweep.csv"
+        again = "bushfit reduce as stated above, then bushfit init again with sweep.csv"
         following = f"{again}; or, without these tests, {following}"
     output.print(f"next: {following}")
 

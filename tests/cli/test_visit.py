@@ -146,8 +146,20 @@ def test_what_has_to_be_reduced_is_left_out_with_the_way_on(typed, root, visited
     (told,) = json.loads(done.stdout)["left_out"]
     name = file.rpartition("/")[2]
     assert f"{name}: {said}; bushfit reduce lab/{name}" in told
-    assert "next: bushfit reduce as stated above, then bushfit init again; or, without" in " ".join(done.stderr.split())
+    assert "next: bushfit reduce as stated above, then bushfit init again with sweep.csv; or" in " ".join(
+        done.stderr.split()
+    )
     assert "results/lab" in done.stderr
+
+
+def test_all_histories_of_a_direction_have_one_command(typed, root, tmp_path):
+    (tmp_path / "lab").mkdir()
+    for name in ("loop_axial_1.csv", "raw_a.csv", "raw_b.csv"):
+        source = "cmp_15961_raw/stepped_sine_axial.csv" if "raw" in name else "cmp_15961/loop_axial_1.csv"
+        (tmp_path / "lab" / name).write_bytes((root / "data" / source).read_bytes())
+    (told,) = json.loads(typed("init", "lab", *GEOMETRY, "--direction", "axial", "--json").stdout)["left_out"]
+    command = "bushfit reduce lab/raw_a.csv lab/raw_b.csv --direction axial"
+    assert told == f"2 raw stepped-sine histories, axial; {command} converts them to sweep.csv"
 
 
 def coupon(model: Model, file: Path, strain: float) -> None:
