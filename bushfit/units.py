@@ -178,7 +178,7 @@ def check_size(value: float, unit: str) -> float:
         return value
     written = "" if unit == "1" else f" {unit}"
     raise UnitError(
-        "no bushing has this",
+        "implausible for a bushing or its tests",
         found=f"{value:g}{written}",
         expected=f"{common_unit(unit)[0]} from {smallest:g} to {largest:g}{written}",
         hint="check the number and its unit",

@@ -163,7 +163,7 @@ def load_bushing(path: Path) -> Bushing:
     table = _read_file(path).bushing
     if table is None:
         expected = "a [bushing] table with name, inner_radius, outer_radius and length"
-        raise CampaignError("there is no bushing in it", file=path, expected=expected)
+        raise CampaignError("the file has no [bushing] table", file=path, expected=expected)
     with error_location(path):
         return table.to_bushing()
 

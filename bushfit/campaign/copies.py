@@ -80,8 +80,8 @@ def without_copied_repeats(sweep: Sweep) -> Sweep:
     columns = {name: getattr(sweep, name) for name in names}
     columns = {name: values[~is_copy] for name, values in columns.items() if isinstance(values, np.ndarray)}
     note = (
-        f"{points} points of repeat{'s' * (len(repeats) > 1)} {_listed([*map(str, repeats)])} equal points of an "
-        "earlier repeat in all digits: they are used once, and data rows are numbered without the copies"
+        f"{points} points of repeat{'s' * (len(repeats) > 1)} {_listed([*map(str, repeats)])} are exact copies of an "
+        "earlier repeat and are left out; row numbers in messages skip the copies"
     )
     return _with_note(replace(sweep, **columns), note)
 

@@ -40,7 +40,7 @@ _GROUPS = {
         "example": "A simulated campaign to try bushfit on.",
         "manual": "The manual in the browser, without a network.",
     },
-    "Before a test, and for other programs": {
+    "Plans, simulations and exports": {
         "plan": "The most informative next tests within your hours.",
         "simulate": "A simulated campaign of tests from a model, with noise.",
         "export": "Files for solvers, multibody codes and spreadsheets.",

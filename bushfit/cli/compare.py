@@ -31,7 +31,7 @@ _ALL = "all"
     option("--preload LOAD", 'Preload such as "500 N" or "1.5 mm", within the tests of each result [none].'),
     option(
         "--families [NAME,...]",
-        "Fit the paper's model and these models to campaign A; NAME is an effect, or several joined by +, such as "
+        "Fit the paper's model and these models to campaign A. NAME is an effect, or several joined by +, such as "
         "kraus+inertia [each law of frequency with each law of amplitude].",
         is_flag=False,
         flag_value=_ALL,
@@ -99,7 +99,7 @@ def _print_comparison(output: Output, name: str, compared: ComparisonOutput) -> 
         for label, comparison in zip(labels, compared.comparisons, strict=True):
             if names := comparison.differing:
                 different.append(f"{label} differs from {first} in {', '.join(names)}")
-        verdict = f"{'; '.join(different)}, by more than chance"
+        verdict = f"{'; '.join(different)}: more than chance explains"
         action = "use each result for its own part; differences.csv lists stiffness and loss factor at each point"
         if not different:
             verdict = f"no stiffness, loss factor or parameter differs from that of {first} by more than chance"

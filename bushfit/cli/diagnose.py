@@ -31,8 +31,8 @@ _COLOURS = {"consistent": "green", "named": "green", "unexplained": "red"}
     ),
     option(
         "--adopt EFFECT",
-        "Add this effect to the model, such as inertia, or correct this mistake in a test file, such as "
-        "peak_to_peak:sweep_axial. If no effect has this name, all names are printed.",
+        "Add this effect, such as inertia, or correct this mistake in a test file, such as "
+        "peak_to_peak:sweep_axial. An unknown name prints all names.",
         multiple=True,
     ),
     option("--without EFFECT", "Exclude this effect or mistake from the search.", multiple=True),

@@ -47,8 +47,8 @@ def parse_motion(text: str) -> LargeMotion:
     ),
     option(
         "--bushing NAME",
-        "Predict this bushing: the name of one of several fitted bushings, or a TOML file with the [bushing] table of "
-        "another bushing of the same compound.",
+        "Predict this bushing: one of several fitted bushings by name, or another bushing of the same compound by a "
+        "TOML file with its [bushing] table.",
     ),
     option("--mass MASS", type=quantity("kg")),
     option(
@@ -89,7 +89,7 @@ def command(model: Path, campaign: Path | None, bushing: str | None, output: Out
 
     result, loaded = load_model(model), load_campaign(campaign) if campaign else None
     if (settings["mass"] is None) != (settings["base_acceleration"] is None):
-        raise click.UsageError("'--mass' and '--base-acceleration' go together.")
+        raise click.UsageError("'--mass' and '--base-acceleration' are needed together.")
     target = None if bushing is None else _bushing_of(result, bushing)
     predicted = predict(result, loaded, bushing=target, **settings)
     _print_summary(output, predicted)

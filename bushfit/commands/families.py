@@ -87,6 +87,6 @@ def family_to_use(families: Sequence[FittedFamily], results: Sequence[Result]) -
     frequencies, strains = format_range("Hz", *reach[0]), format_range("%", *(100.0 * end for end in reach[1]))
     return (
         f"{sentence}; {', '.join(row[0] for row in likely)} (at least {100.0 * _LIKELY:g} %) have the same modulus "
-        f"within {100.0 * _AGREED:g} % over {frequencies} and {strains} shear strain; outside, the tests cannot "
-        "distinguish them"
+        f"within {100.0 * _AGREED:g} % over {frequencies} and {strains} shear strain. Outside this range, the tests "
+        "cannot distinguish them"
     )

@@ -115,7 +115,7 @@ def predict(
     if temperature is not None and not depends_on_temperature:
         raise ModelError(
             "the model has no effect of temperature",
-            found=f"{temperature - CELSIUS:.4g} degC asked for",
+            found=f"{temperature - CELSIUS:.4g} degC requested",
             expected="a model with the effect of temperature",
             hint="fit tests at several temperatures with --effect temperature",
         )

@@ -82,7 +82,7 @@ class FittedFamily:
             f"held-out error {number(self.holdout.after, 3)} x noise (first family: {number(self.holdout.before, 3)})"
         )
         if abs(self.holdout.after / self.holdout.before - 1.0) < _ALIKE:
-            return f"{figures}: alike within {number(100.0 * _ALIKE, 2)} %"
+            return f"{figures}: equal within {number(100.0 * _ALIKE, 2)} %"
         better = sum(part.after < part.before for part in self.holdout.parts)
         figures += f", better in {better} of {len(self.holdout.parts)} parts"
         if self.p >= CHANCE or (self.gain[0] > 0.0) is (self.holdout.after > self.holdout.before):

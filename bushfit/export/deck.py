@@ -259,7 +259,7 @@ def common_omissions(request: ExportRequest) -> Iterator[str]:
         Iterator over sentences.
     """
     yield NO_LOOPS
-    yield "each direction acts by itself: coupling between directions is not included"
+    yield "coupling between directions is not included"
     present = {prediction.direction for prediction in exported_directions(request)}
     missing = [str(direction) for direction in DOFS if direction not in present]
     if request.cardanic is None:

@@ -92,7 +92,9 @@ def time_model(request: ExportRequest) -> TimeModel:
             raise ModelError(
                 "an FMU follows a motion through time, for which this effect has no law",
                 place=effect.name,
-                found="a law of the steady first harmonic alone" if effect.harmonic_only else "a law that no FMU has",
+                found="a law for the steady first harmonic only"
+                if effect.harmonic_only
+                else "a law that the FMU sources lack",
                 expected="effects with a law in time",
                 hint="fit a model without it, or export the stiffness over frequency and amplitude in another format",
             )

@@ -260,7 +260,7 @@ def prior_warnings(uses: Mapping[str, PriorUse]) -> list[str]:
     """Warnings about priors that the tests contradict, one sentence each."""
     return [
         f"the tests contradict the prior of {name} ({use.source}) by {number(abs(use.distance), 2)} standard "
-        "deviations (at most 1.96 for 95 of 100 right priors): check the prior, or leave it out"
+        "deviations (95 % of correct priors: at most 1.96). Check the prior, or leave it out"
         for name, use in uses.items()
         if abs(use.distance) > Z95
     ]

@@ -323,8 +323,8 @@ def temperature_warning(model: Model, data_sets: Sequence[MeasuredTest]) -> list
         return []
     tested = f"{warmest} was tested at {number(high, 3)} degC and {coldest} at {number(low, 3)} degC"
     return [
-        f"{tested}, {number(high - low, 3)} degC apart. This model has no effect of temperature, and another "
-        "effect may stand for it: fit the tests of each temperature separately, or with --effect temperature"
+        f"{tested}, {number(high - low, 3)} degC apart. This model has no effect of temperature, so another "
+        "effect may absorb the difference: fit each temperature separately, or use --effect temperature"
     ]
 
 

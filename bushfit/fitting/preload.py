@@ -75,8 +75,8 @@ def with_preload(data: PreparedCampaign) -> PreparedCampaign:
         has_influence = True
         if tested.count == 2:
             notes.append(
-                f"{listed}: the model follows a straight line over the {line}, and no test shows whether it is "
-                "straight; add tests at a third preload between them"
+                f"{listed}: the model follows a straight line over the {line}, which two preloads cannot confirm. "
+                "Add tests at a third preload between them"
             )
     if not has_influence:
         return replace(data, preload_notes=tuple(notes))

@@ -121,7 +121,7 @@ def _check_loses_energy(prepared: MeasuredLoop) -> None:
             expected="a force that leads the displacement",
             hint="are the columns of displacement and force swapped, or do the rows run backwards in time? Name the "
             'columns in the campaign: columns = { displacement = "...", force = "..." }. A filter or a delay of the '
-            f"force by more than {late} ms does the same",
+            f"force by more than {late} ms has the same effect",
         )
 
 

@@ -255,7 +255,7 @@ class PreparedCampaign:
         chosen = [data_set for data_set in data_sets if data_set.direction in wanted]
         if not chosen:
             raise FitError(
-                "no test in the directions asked for",
+                "no test in the requested directions",
                 file=self.campaign.path,
                 found=", ".join(sorted({str(data_set.direction) for data_set in data_sets})),
                 expected=", ".join(places),

@@ -362,8 +362,8 @@ def fit_warnings(model: Model, step: FitResult, bounds: Bounds, covariance: Cova
     sentences = [*([unknown] if unknown else []), *notes]
     if step.stopped:
         sentences.append(
-            f"the fit was stopped after {step.evaluations} evaluations of the model, where chi-square is flat: "
-            "undetermined parameters could change further without effect"
+            f"the fit was stopped after {step.evaluations} evaluations of the model, because chi-square hardly fell: "
+            "some parameters are undetermined"
         )
     limited = replace(step, problem=replace(step.problem, bounds=bounds))
     for name, end in at_bound.items():

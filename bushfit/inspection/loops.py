@@ -79,7 +79,7 @@ def describe_loop(loop: Loop, labels: Labels) -> Findings:
     if prepared.cycles < 1.5 and abs(mean_motion) > 0.9 * half_motion:
         odd.append(
             f"one loading and unloading from {number(to_length * loop.displacement[0], 3)} {length}: a static curve is "
-            "read as a loop about its mean; record three cycles or more, of which the first settle the rubber"
+            "read as a loop about its mean. Record three cycles or more, because the first cycles settle the rubber"
         )
     if frequency * _LONGEST_CYCLE < 1.0:  # longer than any laboratory waits: what may the file say instead?
         mistakes = [mistake.in_words(prepared.test) for mistake in MISTAKES.values() if mistake.time < 1.0]
@@ -250,6 +250,6 @@ def ripple(prepared: MeasuredLoop) -> Iterator[str]:
         yield (
             f"a ripple of about {number(factor * lines[line], 2)} {unit} at {frequency[line]:.3g} Hz "
             f"({number(100 * lines[line] / prepared.amplitude[0], 2)} % of the amplitude) is superposed on the motion: "
-            f"{'mains hum' if is_mains else 'an oscillating controller, or play at the reversals'}? The slow motion is "
-            "read as the loop"
+            f"{'mains hum' if is_mains else 'an oscillating controller, or play at the reversals'}? The loop is the "
+            "slow motion"
         )

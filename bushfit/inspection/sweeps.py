@@ -131,7 +131,7 @@ def odd_levels(sweep: Sweep, points: pd.DataFrame) -> Iterator[str]:
     if not steps.empty and steps.min() < _SMALLEST_STEP and round(of_frequency) != passes:
         yield (
             f"two amplitudes at {levels['frequency'][steps.idxmin()]:.4g} Hz differ by "
-            f"{number(100 * np.expm1(steps.min()), 2)} % and are treated as two levels; if the levels are repeats, "
+            f"{number(100 * np.expm1(steps.min()), 2)} % and are treated as two levels. If the levels are repeats, "
             "number the repeats in a column repeat"
         )
     relative_miss = np.abs(sweep.amplitude_reached / sweep.amplitude - 1.0)

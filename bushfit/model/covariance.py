@@ -77,7 +77,7 @@ class Covariance:
         """
         names = [name for name in self.names if not name.startswith("preload.")]
         unknown = ", ".join(name for name in names if self.half_widths[name] >= abs(values[name]))
-        return unknown and f"the tests leave {unknown} open (unknown by 100 % or more)"
+        return unknown and f"the tests do not determine {unknown} (95 % interval of +-100 % or more)"
 
     def freedom(self, slopes: Array) -> Array:
         """Effective degrees of freedom of the variances of n quantities, (n,), for Student's t.

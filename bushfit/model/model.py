@@ -119,7 +119,7 @@ class Model:
             raise ModelError(
                 "an effect of the model has no law in time, which this calculation needs",
                 place=" and ".join(names),
-                found="a law of the steady first harmonic alone",
+                found="a law for the steady first harmonic only",
                 expected="effects with a law in time",
                 hint="use a model without this effect, or predict the steady state",
             )

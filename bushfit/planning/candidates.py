@@ -177,6 +177,6 @@ def unlimited_rig_warning(knowledge: Knowledge, rig: RigSettings, tests: Sequenc
     point = f"{number(1e3 * amplitude[fastest], 3)} mm at {number(frequency[fastest], 3)} Hz"
     return (
         f"[rig] states no limits: the plan reaches {number(velocity, 3)} m/s ({point}), "
-        f"{number(acceleration, 3)} g and {number(force, 3)} N; state max_velocity, max_force, max_displacement and "
+        f"{number(acceleration, 3)} g and {number(force, 3)} N. State max_velocity, max_force, max_displacement and "
         "max_frequency, and plan again"
     )

@@ -118,7 +118,7 @@ def guess_parameters(bushing: Bushing, compound: Compound) -> Knowledge:
     widths = zip(FIVE, np.exp(Z95 * np.sqrt(np.diag(covariance))).tolist(), strict=True)
     source = (
         f"an estimate from {number(compound.hardness, 3)} Shore A and {number(compound.filler, 3)} phr of carbon black "
-        f"in {compound.rubber} rubber: Gent's relation for the modulus, the paper's compound for the rest; 95 % of "
+        f"in {compound.rubber} rubber: Gent's relation for the modulus, the paper's compound for the rest. 95 % of "
         f"rubbers are assumed within factors of {', '.join(f'{number(factor, 2)} ({name})' for name, factor in widths)}"
     )
     return Knowledge(Result(Model(bushing, BASE, values)), FIVE, covariance, source)

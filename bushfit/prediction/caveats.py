@@ -93,12 +93,12 @@ def caveats(result: Result) -> list[str]:
         lines.append("the model has no springpot: its stiffness does not depend on frequency")
     if unnamed := result.model.unnamed:
         lines.append(
-            "the unnamed correction follows the measurement, not a law: outside the measured range, it fades "
+            "the unnamed correction follows the measurement, not a law. Outside the measured range, it fades "
             f"and the band widens by up to +/-{number(100.0 * Z95 * unnamed.far_deviation, 2)} %"
         )
         lines.append(
             "the unnamed correction is assigned to the bushing, but these tests cannot distinguish it "
-            "from an effect of the rig: if it belongs to the rig, |K| of the bushing in the car differs by up to "
+            "from an effect of the rig. If it belongs to the rig, |K| of the bushing in the car differs by up to "
             f"{number(100.0 * unnamed.largest, 2)} %"
         )
     if result.measured is None:

@@ -227,7 +227,7 @@ def _warnings(result: Result, response: TimeResponse, left_out: list[str], tempe
         )
     if (result.model.unnamed or result.model_error) and "friction" in result.model.effects:
         warnings.append(
-            f"{place}: friction laws that agree in sines can differ in a mixed motion by more than the band: compare "
+            f"{place}: friction laws that agree in sines can differ in a mixed motion by more than the band. Compare "
             "with a fit with --effect distributed_sliders, or with a [[validation]] record"
         )
     if left_out:
@@ -240,8 +240,8 @@ def _warnings(result: Result, response: TimeResponse, left_out: list[str], tempe
     start = abs(float(history.value[0]))
     if not history.periodic and start > _JUMP * np.abs(np.diff(history.value)).max():
         warnings.append(
-            f"{place}: the history begins at {number(factor * start, 3)} {unit}, to which the model jumps from rest at "
-            "0: begin the history at rest, or subtract its start"
+            f"{place}: the history begins at {number(factor * start, 3)} {unit}, but the model starts from rest at 0. "
+            "Begin the history at rest, or subtract its first value"
         )
     shortest = 2.0 * (1.0 - MARGIN) * result.measured.strain[0] / response.unit_strain if result.measured else 0.0
     short = strokes[strokes < shortest].sum() / max(strokes.sum(), np.finfo(float).tiny)
@@ -249,8 +249,8 @@ def _warnings(result: Result, response: TimeResponse, left_out: list[str], tempe
         noise, highest = noise_and_highest_frequency(history.value, history.step)
         warnings.append(
             f"{place}: most reversals of the displacement are as small as its noise, {number(factor * noise, 2)} "
-            f"{unit} rms, and friction follows each of them: smooth the displacement, --lowpass "
-            f'"{number(2.0 * highest, 2)} Hz" keeps the motion'
+            f"{unit} rms, and friction follows each of them. To smooth the displacement and keep the motion, "
+            f'use --lowpass "{number(2.0 * highest, 2)} Hz"'
         )
     elif short > _MOST_SHORT:
         warnings.append(
@@ -259,7 +259,7 @@ def _warnings(result: Result, response: TimeResponse, left_out: list[str], tempe
         )
     if not history.periodic and (samples := 1.0 / (history.frequency * history.step)) < _FEWEST_PER_CYCLE:
         warnings.append(
-            f"{place}: the history has {number(samples, 2)} samples in a mean cycle, and forces between them are "
-            "missed: sample it more finely"
+            f"{place}: the history has {number(samples, 2)} samples in a mean cycle, too few for the force between "
+            "samples: sample it more finely"
         )
     return warnings

@@ -71,7 +71,7 @@ def _from_hdf5(node: Any) -> Any:
 def _refuse_too_many(values: int) -> None:
     """Raise a ValueError if a compressed file would unpack to more values than any recording has."""
     if values > _MOST_VALUES:
-        raise ValueError(f"it unpacks to {values} values, of which at most {_MOST_VALUES} are read")
+        raise ValueError(f"the file unpacks to {values} values, of which at most {_MOST_VALUES} are read")
 
 
 def _in_struct(path: str, content: Mapping[str, Any]) -> Iterator[Group]:
@@ -113,7 +113,7 @@ def tdms(data: bytes, _: Path) -> Iterator[Group]:
 
     file = TdmsFile.read(io.BytesIO(data))
     if file.file_status.incomplete_final_segment:
-        raise ValueError("its last segment is not complete")
+        raise ValueError("the last segment of the file is not complete")
     for group in file.groups():
         channels = []
         for channel in group.channels():

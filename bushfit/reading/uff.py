@@ -35,7 +35,7 @@ def uff(data: bytes, file: Path) -> Iterator[Group]:
     import pyuff
 
     if not data.rstrip().endswith(_MARK):
-        raise ValueError("its last dataset has no end")
+        raise ValueError("the last dataset of the file has no end")
     book = pyuff.UFF(str(file))
     kinds = list(book.get_set_types())
     read_kind = 58 if 58 in kinds else 55

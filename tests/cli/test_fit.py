@@ -23,7 +23,7 @@ REPEATS_OFF = "repeats differ as a whole by an error of"
 ROWS_APART = "repeats of the same points differ by up to"
 #: Files that run and diagnose write alike.
 ALIKE = ("diagnosis.json", "gap.csv", "candidates.csv")
-UNKNOWN = "the tests leave mu, m, alpha open (unknown by 100 % or more)"
+UNKNOWN = "the tests do not determine mu, m, alpha (95 % interval of +-100 % or more)"
 
 
 @pytest.mark.parametrize("command", FILES)

@@ -59,7 +59,7 @@ def test_families_of_one_campaign_are_fitted_and_held_out(bushfit, tmp_path):
     assert table["label"].tolist() == ["A", "B", "C"]
     assert table["held out [noise]"].notna().all()
     assert "\nthe first family meets these tests within their noise" in done.stderr
-    assert table["words"][2].endswith("alike within 1 %")
+    assert table["words"][2].endswith("equal within 1 %")
 
 
 def test_predict_lays_measurements_over_takes_grids_and_shows_at_most_eight_amplitudes(bushfit, tmp_path):

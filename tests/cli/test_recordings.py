@@ -104,7 +104,7 @@ SPOILED: list[tuple[str, Callable[[Path], object], tuple[str, ...]]] = [
     ("empty.mf4", lambda file: file.write_bytes(b""), ("the file is empty",)),
     ("scalars.mat", lambda file: savemat(file, {"a": 1.0, "b": "text"}), ("holds no channels", "table2struct")),
     ("modes.unv", lambda file: pyuff.UFF(str(file)).write_sets([MILLIMETRES], "overwrite"), ("dataset 58",)),
-    ("bomb.mat", bomb, ("cannot be read", "it unpacks to 1099511627776 values")),
+    ("bomb.mat", bomb, ("cannot be read", "the file unpacks to 1099511627776 values")),
     *((f"cut.{ending}", cut(ending), ("file cannot be read", "incomplete")) for ending in recordings.WRITERS),
 ]  # fmt: skip
 

@@ -60,7 +60,7 @@ def test_one_column_takes_its_direction_from_an_option(bushfit, tmp_path):
         (TIME + 0.002 * np.sin(20.0 * TIME), MOTION, (), "resampled evenly at"),
         (TIME, MOTION + 1000.0, (), "1000 mm, the first value, is subtracted"),
         (TIME, MOTION + 1000.0, ("--steady",), "1000 mm, the mean, is subtracted"),
-        (TIME, MOTION + 2.0, (), "the history begins at 2 mm, to which the model jumps"),
+        (TIME, MOTION + 2.0, (), "the history begins at 2 mm, but the model starts"),
         (TIME, 10.0 * MOTION, (), "but fitted at"),
         (TIME, MOTION, ("--lowpass", "60 Hz"), "low-passed at 60 Hz without delay, which removes"),
     ],

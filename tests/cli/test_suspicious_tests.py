@@ -33,7 +33,7 @@ def test_copies_count_once(bushfit, own, once, command):
     once.write_text(text, encoding="utf-8")
     done = bushfit(command, once, "-o", own / "copied", "--no-plots")
     assert "loop_axial_1: again.csv and linked.csv with the same data: used once" in done.stderr
-    assert f"{2 * len(sweep)} points of repeats 2 and 3 equal points of an earlier repeat in all digits" in done.stderr
+    assert f"{2 * len(sweep)} points of repeats 2 and 3 are exact copies of an earlier repeat" in done.stderr
     single, copied = (load_result(own / folder / "model.json") for folder in ("once", "copied"))
     assert vars(copied.model)["values"] == vars(single.model)["values"]
     assert copied.covariance.stderr("m") == single.covariance.stderr("m")

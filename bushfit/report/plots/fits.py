@@ -241,7 +241,7 @@ def loops_figure(result: Result, table: pd.DataFrame, title: str) -> style.Chart
         model = {"model": Line2D([], [], color=style.INK, lw=0.8)}
         style.legend(phase_panel, [look.handle(False) for look in looks], loop_labels(place, loops), "loop", model)
     return figure.explain(
-        "Left: measured force over noise-free displacement. Black lines: model. Right: measured minus model, "
+        "Left: measured force over displacement (noise removed). Black lines: model. Right: measured minus model, "
         f"in units of the noise of a row, and means over {SECTOR:g}° of the cycle (lines). 95 % of the points should "
         "be in the grey band.",
         _OUTLIERS * bool((table["outlier"] == "yes").any()),
