@@ -4,7 +4,7 @@ The header is the line that names the columns of a test and is followed by rows 
 
 Notes:
     csv.Sniffer, clevercsv, DuckDB and polars, without further information, read fewer than half of the dialects in
-    tests/dialects.py. If encoding and decimal mark are known, clevercsv separates the columns of nearly all.
+    tests/files/exports. If encoding and decimal mark are known, clevercsv separates the columns of nearly all.
 """
 
 import csv
