@@ -111,11 +111,10 @@ def remove_unlisted_parts(plan: BatchPlan) -> list[str]:
     records = (plan.task.output / store.ROWS_FOLDER).glob(f"*/{store.ROW_FILE}")
     folders = [record.parent for record in records if record.parent.name not in current]
     outcome = "are still in bushings/ (--force removes them)" if plan.task.resume else "were removed from bushings/"
+    several = "bushings of an earlier batch that are" if len(folders) > 1 else "bushing of an earlier batch that is"
     for folder in () if plan.task.resume else folders:
         shutil.rmtree(folder)
-    return (
-        [f"results of {len(folders)} bushings of an earlier batch, no rows of this one, {outcome}"] if folders else []
-    )
+    return [f"results of {len(folders)} {several} not in this batch {outcome}"] if folders else []
 
 
 def batch_files(result: BatchResult) -> list[ResultFile]:
@@ -131,6 +130,6 @@ def batch_files(result: BatchResult) -> list[ResultFile]:
     files = [ResultFile("batch", "json", to_json_data(document, BatchFile)), table]
     if formats.pages:
         files.append(ResultFile("index", "page", partial(index_page, document, result.plan.task.output)))
-    if formats.pictures and plots.batch.quantities_to_draw(document, table.content):
-        files.append(ResultFile("batch", "figure", partial(plots.batch.batch_figure, document), table))
+    if formats.pictures and plots.batch.quantities_to_draw(document, table.content()):
+        files.append(ResultFile("batch", "figure", lambda: plots.batch.batch_figure(document, table.content())))
     return files

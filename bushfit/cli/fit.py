@@ -140,7 +140,7 @@ def _print_and_write(
     output.print_headline(campaign.name, verdict, f"next: {action}")
     for title, step in fitted.steps:
         print_step(output, f"{campaign.name}: {title}", step)
-    for table in (part.content for part in fitted.files if part.name == "bushings"):
+    for table in (part.content() for part in fitted.files if part.name == "bushings"):
         rows = [
             (row[0], str(row[1]), *(number(value, 2) for value in row[2:])) for row in table.itertuples(index=False)
         ]

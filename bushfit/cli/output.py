@@ -55,8 +55,6 @@ _PATIENCE = 2.0
 _WIDTH = 100
 #: Largest number of warnings that are printed without -v.
 _MOST_WARNINGS = 3
-#: Pattern of numbers, in which warnings of the same kind for several tests differ.
-_NUMBERS = re.compile(r"[-+\d.]+")
 #: Characters between two columns of a table.
 _GAP = 3
 
@@ -136,14 +134,14 @@ class Output:
         """Print the most important collected warnings, one of each kind; with -v all."""
         if not self._warnings:
             return
-        from bushfit.prediction.caveats import by_importance, consequence_of
+        from bushfit.prediction.caveats import by_importance, consequence_of, without_numbers
 
         warnings = by_importance(self._warnings)
         if not self.verbose:
             warnings = [line for line in warnings if not any(line in verdict for verdict in self._headlines)]
         distinct: dict[str, str] = {}
         for line in warnings:
-            distinct.setdefault(_NUMBERS.sub("", line.partition(": ")[2] or line), line)
+            distinct.setdefault(without_numbers(line.partition(": ")[2] or line), line)
         printed = warnings if self.verbose else [*distinct.values()][:_MOST_WARNINGS]
         for warning in printed:
             self.console.print(f"[yellow]warning:[/yellow] {escape(warning)}")

@@ -149,16 +149,18 @@ def _print_summary(output: Output, predicted: PredictionOutput) -> None:
 
 
 def _print_static(output: Output, curve: StaticCurve) -> None:
-    """Print the displacement range and loading rate of a static curve, and its stiffness over the range and at zero."""
+    """Print the range and rate of a static curve, its stiffness over the range with its 95 % interval, and at zero."""
     from bushfit.units import format_range, number
 
     (unit, length), _, (name, factor) = curve.direction.display
     reach = format_range(unit, length * curve.displacement[-1])
     middle = curve.displacement.size // 2
-    secant, slope = (number(factor * value, 4) for value in (curve.secant.value[0], curve.slope.value[middle]))
+    values = (curve.secant.value[0], curve.secant.low[0], curve.secant.high[0], curve.slope.value[middle])
+    secant, low, high, slope = (number(factor * value, 4) for value in values)
+    interval = f" (95 %: {low} to {high})" if low != high else ""
     output.print(
         f"{curve.label}: static {curve.direction.motion.words[2]} {secant} {name} from -{reach} to {reach} at "
-        f"{curve.rate_text}, {slope} {name} at zero displacement"
+        f"{curve.rate_text}{interval}, {slope} {name} at zero displacement"
     )
 
 

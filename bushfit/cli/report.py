@@ -33,5 +33,5 @@ def command(folder: Path, date: str | None, output: Output) -> None:
     base = "" if output.output is None else f"{folder.resolve().as_uri()}/"
     day = calendar.today().isoformat() if date == "today" else date
     files = folder_pages(folder, base, day)
-    sizes = {str(target / f"{file.name}.html"): len(file.content.encode()) for file in files}
+    sizes = {str(target / f"{file.name}.html"): len(file.content().encode()) for file in files}
     replace(output, force=True).write(target, files, {"pages": sizes})

@@ -1,10 +1,10 @@
 """compare: several results compared with the first, or model families on one campaign."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from string import ascii_uppercase
-from typing import Unpack
+from typing import Any, Unpack
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import PredictSettings
@@ -25,8 +25,16 @@ from bushfit.prediction.comparison import compare as compare_two
 from bushfit.prediction.grid import common_grid, requested_grid
 from bushfit.reading.measurement import Sweep
 from bushfit.report import plots
-from bushfit.report.compare_document import SCHEMA, ComparedEntry, ComparisonFile, FamilyEntry
-from bushfit.report.compared import ComparisonDocument, contrast_table
+from bushfit.report.compare_document import (
+    SCHEMA,
+    ComparedEntry,
+    ComparedPair,
+    ComparisonFile,
+    FamilyEntry,
+    HeldOutPart,
+    JointContrast,
+)
+from bushfit.report.compared import contrast_table, differences_table, families_table, parameter_differences_table
 from bushfit.report.page.comparison import comparison_page
 from bushfit.report.results import ResultFile
 from bushfit.validation import to_json_data
@@ -69,7 +77,8 @@ class ComparisonOutput:
         words: sentences on the differences, one for each result and direction.
         notes: warnings on the families.
         warnings: all warnings without repetition, each with the letters of the results that it concerns.
-        document: content of compare.json.
+        compared: content of compare.json.
+        document: the same as JSON data.
         files: document, tables, figure and page.
     """
 
@@ -78,11 +87,12 @@ class ComparisonOutput:
     words: Sequence[str]
     notes: Sequence[str]
     warnings: Sequence[str]
-    document: ComparisonFile
+    compared: ComparisonFile
+    document: Mapping[str, Any]
     files: Sequence[ResultFile]
 
     def __repr__(self) -> str:
-        return f"Comparison of {', '.join(entry['name'] for entry in self.document['compared'])}"
+        return f"Comparison of {', '.join(entry.name for entry in self.compared.compared)}"
 
 
 def compare(
@@ -192,41 +202,27 @@ def _compared(
         f"{label}, {family.name}: {family.words}" for label, family in zip(labels[1:], families[1:], strict=False)
     ]
     warnings = [*notes, *_warnings(labels, entries, comparisons, are_families=bool(families))]
-    records: ComparisonFile = {
-        "schema": SCHEMA,
-        "compared": [_entry_document(label, entry) for label, entry in zip(labels, entries, strict=True)],
-        "pairs": [
-            {
-                "reference": "A",
-                "other": label,
-                "shared_inputs": list(comparison.shared),
-                "joint": {"p": comparison.joint[0], "parameters": comparison.joint[1]} if comparison.joint else None,
-                "parameters": list(comparison.parameters),
-                "places": {
-                    str(contrast.place): table_columns(contrast_table(comparison, contrast))
-                    for contrast in comparison.contrasts
-                },
-            }
-            for label, comparison in pairs
-        ],
-        "families": [
-            _family_document(label, family, result)
-            for label, family, result in zip(labels, families, results, strict=False)
-        ]
-        or None,
-        "words": [*advice, *words],
-        "warnings": warnings,
-        "command": command,
-        "versions": {"bushfit": __version__, **versions()},
-    }
-    document = to_json_data(records, ComparisonFile)
-    table = ComparisonDocument.from_document(document)
-    names = ("parameters", *(["families"] if families else []), "differences")
-    figure = ResultFile("compare", "figure", lambda: plots.comparison.comparison_figure(table))
-    files = [ResultFile("compare", "json", document), figure]
-    files += [ResultFile(name, "table", partial(lambda name: table.tables()[name], name)) for name in names]
-    files.append(ResultFile("compare", "page", partial(comparison_page, table, figure)))
-    return ComparisonOutput(comparisons, advice, words, notes, warnings, document, files)
+    compared = ComparisonFile(
+        SCHEMA,
+        [_entry(label, entry) for label, entry in zip(labels, entries, strict=True)],
+        [_pair(label, comparison) for label, comparison in pairs],
+        [_family(*row) for row in zip(labels, families, results, strict=False)] or None,
+        [*advice, *words],
+        warnings,
+        command,
+        {"bushfit": __version__, **versions()},
+    )
+    document = to_json_data(compared, ComparisonFile)
+    figure = ResultFile("compare", "figure", lambda: plots.comparison.comparison_figure(compared))
+    files = [
+        ResultFile("compare", "json", document),
+        figure,
+        ResultFile("parameters", "table", partial(parameter_differences_table, compared)),
+        *([ResultFile("families", "table", partial(families_table, compared.families))] if compared.families else []),
+        ResultFile("differences", "table", partial(differences_table, compared)),
+        ResultFile("compare", "page", partial(comparison_page, compared, figure)),
+    ]
+    return ComparisonOutput(comparisons, advice, words, notes, warnings, compared, document, files)
 
 
 def _warnings(
@@ -291,38 +287,47 @@ def _common_places(results: Sequence[Result], names: Sequence[str] | None) -> li
     return matching or [[COMPOUND] * len(results)]
 
 
-def _entry_document(label: str, entry: ComparedResult) -> ComparedEntry:
-    """Convert a compared result to its entry in compare.json; `label` is its letter in tables."""
+def _entry(label: str, entry: ComparedResult) -> ComparedEntry:
+    """Make the entry of a compared result in compare.json; the label, a letter, stands for it in tables."""
     result, bushing = entry.result, to_document(Result(entry.result.model))["bushing"]
-    return {
-        "label": label,
-        "name": entry.name,
-        "source": entry.source,
-        "sha256": entry.sha256,
-        "bushing": BushingTable(**bushing) if bushing else None,
-        "effects": list(result.model.effects),
-        "reduced_chi_square": result.quality.reduced_chi_square if result.quality else None,
-        "nrmse": result.quality.nrmse if result.quality else None,
-        "measured": result.measured,
-        "inputs": result.inputs,
+    return ComparedEntry(
+        label,
+        entry.name,
+        entry.source,
+        entry.sha256,
+        BushingTable(**bushing) if bushing else None,
+        list(result.model.effects),
+        result.quality.reduced_chi_square if result.quality else None,
+        result.quality.nrmse if result.quality else None,
+        result.measured,
+        result.inputs,
+    )
+
+
+def _pair(label: str, comparison: Comparison) -> ComparedPair:
+    """Make the entry in compare.json for the comparison of a result, by its letter (`label`), with the reference."""
+    places = {
+        str(contrast.place): table_columns(contrast_table(comparison, contrast)) for contrast in comparison.contrasts
     }
+    joint = JointContrast(*comparison.joint) if comparison.joint else None
+    return ComparedPair("A", label, comparison.shared, joint, comparison.parameters, places)
 
 
-def _family_document(label: str, family: FittedFamily, result: Result) -> FamilyEntry:
-    """Entry of a model family in compare.json, with its held-out residual; `label` is its letter in tables."""
+def _family(label: str, family: FittedFamily, result: Result) -> FamilyEntry:
+    """Make the entry of a model family, by its letter (`label`), in compare.json, with its held-out residual."""
     fit, held_out = family.fit, family.holdout
-    return {
-        "label": label,
-        "name": family.name,
-        "parameters": len(fit.names),
-        "reduced_chi_square": result.quality.reduced_chi_square if result.quality else fit.reduced_chi_square,
-        "bic": family.bic,
-        "heldout": held_out.after,
-        "first_there": held_out.before,
-        "gain": family.gain,
-        "p": family.p,
-        "probability": family.probability,
-        "parts": [{"part": part.part, "first": part.before, "heldout": part.after} for part in held_out.parts],
-        "skipped": list(held_out.skipped),
-        "words": family.words if label != "A" else "",
-    }
+    return FamilyEntry(
+        label,
+        family.name,
+        len(fit.names),
+        result.quality.reduced_chi_square if result.quality else fit.reduced_chi_square,
+        family.bic,
+        held_out.after,
+        held_out.before,
+        family.gain,
+        family.p,
+        family.probability,
+        [HeldOutPart(part.part, part.before, part.after) for part in held_out.parts],
+        held_out.skipped,
+        family.words if label != "A" else "",
+    )

@@ -136,12 +136,11 @@ def diagnose(
             for validation, plain_validation in zip_longest(validations, before)
         ]
     title, gap = data.campaign.name, ResultFile("gap", "table", partial(diagnosed.gap_table, diagnosis))
-    draw = lambda table: plots.gap.gap_figure(table, diagnosis.result, document, title)  # noqa: E731  # imported late
     files = [
         ResultFile("diagnosis", "json", document),
         ResultFile("model", "json", result_document(diagnosis.result, origin)),
         gap,
-        ResultFile("gap", "figure", draw, gap),
+        ResultFile("gap", "figure", lambda: plots.gap.gap_figure(gap.content(), diagnosis.result, document, title)),
         ResultFile("candidates", "table", partial(diagnosed.candidates_table, diagnosis)),
     ]
     files += validation_files(validations, before, title)

@@ -9,7 +9,6 @@ from itertools import groupby
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any, TypeVar
 
-import numpy as np
 import pandas as pd
 
 from bushfit.fitting.agreement import expected_errors, misfits
@@ -95,14 +94,21 @@ class PredictionOutput:
         return warnings_of(self.result, predicted, self.notes)
 
     @cached_property
+    def measured_by_fit(self) -> tuple[list[MeasuredSweep], list[MeasuredSweep]]:
+        """Measured sweeps to which the model was fitted, by the hashes of their files, and the others."""
+        digests = {source.sha256 for source in self.result.inputs}
+        fitted = [sweep for sweep in self.measured if sweep.source and sweep.source.sha256 in digests]
+        return fitted, [sweep for sweep in self.measured if sweep not in fitted]
+
+    @cached_property
     def tests(self) -> tuple[Misfit, ...]:
         """Misfit between model and each measured sweep and run: NRMSE, reduced chi-square, mean difference of |K|."""
-        return misfits(self.result.model, *split_by_fit(self.result, self.measured))
+        return misfits(self.result.model, *self.measured_by_fit)
 
     @cached_property
     def usable(self) -> tuple[ExpectedError, ...]:
         """Expected error of |K| (relative) and loss factor (absolute) in each direction, from the measured sweeps."""
-        return expected_errors(self.result.model, *split_by_fit(self.result, self.measured))
+        return expected_errors(self.result.model, *self.measured_by_fit)
 
 
 def prediction_files(
@@ -161,9 +167,10 @@ def prediction_files(
                 title = f"{result.name}: {part[0].label if len(part) == 1 else part[0].direction}, static curve"
                 files.append(ResultFile(stem, "figure", partial(plots.prediction.static_figure, part, title)))
     if output.measured:
-        parts = split_by_fit(result, output.measured)
-        make = partial(tables.sweeps_table, result.model, [sweep for part in parts for sweep in part])
-        use = np.repeat(["yes", "no"], [sum(sweep.frequency.size for sweep in part) for part in parts])
+        fitted, others = output.measured_by_fit
+        make = partial(tables.sweeps_table, result.model, [*fitted, *others])
+        use = ["yes"] * sum(sweep.frequency.size for sweep in fitted)
+        use += ["no"] * sum(sweep.frequency.size for sweep in others)
         files.append(ResultFile("measured", "table", lambda: make().assign(fitted=use)))
     return files
 
@@ -181,10 +188,3 @@ def joined_table(make: Callable[[Part], pd.DataFrame], parts: Sequence[Part]) ->
 def table_columns(table: pd.DataFrame) -> dict[str, list[Any]]:
     """Convert a table to lists by column header, with None for empty cells."""
     return {str(name): [None if x != x else x for x in column.tolist()] for name, column in table.items()}
-
-
-def split_by_fit(result: Result, sweeps: Sequence[MeasuredSweep]) -> tuple[list[MeasuredSweep], list[MeasuredSweep]]:
-    """Split sweeps into those to which the model was fitted, by the hash of their files, and the others."""
-    digests = {source.sha256 for source in result.inputs}
-    fitted = [sweep for sweep in sweeps if sweep.source and sweep.source.sha256 in digests]
-    return fitted, [sweep for sweep in sweeps if sweep not in fitted]

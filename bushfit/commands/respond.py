@@ -1,10 +1,12 @@
 """respond: force of a fitted model over time for a displacement history."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from typing_extensions import TypedDict
@@ -25,6 +27,9 @@ from bushfit.reduction.displacement import prepare_displacements
 from bushfit.report import plots
 from bushfit.report.response import record_table, response_figures, response_table, validation_table
 from bushfit.report.results import ResultFile
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 class ResponseDocument(TypedDict):
@@ -125,9 +130,13 @@ def respond(
     figures = {str(response.direction): response_figures(response) for response in responses}
     title, time = f"{result.name}: force over time", prepared[0].time
     table = ResultFile("response", "table", partial(response_table, time, responses))
-    draw = lambda table: plots.response.response_figure(title, table, plots.style.warnings_note(warnings))  # noqa: E731
-    files = [table, ResultFile("response", "figure", draw, table)]
+    files = [table, ResultFile("response", "figure", partial(draw_response, title, table, warnings))]
     return ResponseOutput(result, time, responses, warnings, {"directions": figures, "warnings": warnings}, files)
+
+
+def draw_response(title: str, table: ResultFile, warnings: Sequence[str] = ()) -> Figure:
+    """Draw the force over time in a table of `respond`, or of a validation record, with warnings below the figure."""
+    return plots.response.response_figure(title, table.content(), plots.style.warnings_note(warnings))
 
 
 def validation_files(validations: Sequence[Validation], before: Sequence[Validation], title: str) -> list[ResultFile]:
@@ -142,10 +151,9 @@ def validation_files(validations: Sequence[Validation], before: Sequence[Validat
         Result files, not yet rendered; empty without records.
     """
     files = [ResultFile("validation", "table", lambda: validation_table(validations, before))] if validations else []
-    draw = lambda title, table: plots.response.response_figure(title, table)  # noqa: E731  # imported late
     for validation in validations:
         name = f"validation_{folder_name(validation.record.name)}"
         record_title = f"{title}: {validation.record.name}"
         record = ResultFile(name, "table", partial(record_table, validation))
-        files += [record, ResultFile(name, "figure", partial(draw, record_title), record)]
+        files += [record, ResultFile(name, "figure", partial(draw_response, record_title, record))]
     return files

@@ -84,4 +84,4 @@ def _content(output: CommandOutput, name: str, kind: Kind) -> Any:
         word = {"figure": "picture"}.get(kind, kind)
         expected = "one of " + ", ".join(files) if files else f"an output with a {word}"
         raise BushfitError(f"there is no such {word}", found=name, expected=expected, hint=did_you_mean(name, files))
-    return files[name].content
+    return files[name].content()

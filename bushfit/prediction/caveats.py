@@ -45,6 +45,13 @@ _RANKS = (
 #: Reduced chi-square of a sweep that was not fitted, up to which it agrees within its noise; chosen: 95 % of the values
 #: of 20 points are below.
 _AGREEMENT = 1.4
+#: Pattern of a number in a warning.
+_NUMBER = re.compile(r"[-+\d.]+")
+
+
+def without_numbers(warning: str) -> str:
+    """Text of a warning without its numbers, in which warnings of the same kind on several tests or parts differ."""
+    return _NUMBER.sub("", warning)
 
 
 def consequence_of(warning: str) -> str:

@@ -1,8 +1,8 @@
 """Types of `compare.json`, the JSON file of a comparison, from which its JSON Schema is made."""
 
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Literal
-
-from typing_extensions import TypedDict
 
 from bushfit.diagnosis.holdout import Skipped
 from bushfit.model.document import BushingTable
@@ -16,7 +16,8 @@ SchemaName = Literal["bushfit/compare/1"]
 SCHEMA: SchemaName = "bushfit/compare/1"
 
 
-class ComparedEntry(TypedDict):
+@dataclass(frozen=True)
+class ComparedEntry:
     """Entry of compare.json for one of the compared results: name, source, model and agreement with its tests.
 
     Args:
@@ -37,14 +38,15 @@ class ComparedEntry(TypedDict):
     source: str
     sha256: str | None
     bushing: BushingTable | None
-    effects: list[str]
+    effects: Sequence[str]
     reduced_chi_square: Number | None
     nrmse: Number | None
     measured: Range | None
     inputs: tuple[Source, ...]
 
 
-class JointContrast(TypedDict):
+@dataclass(frozen=True)
+class JointContrast:
     """Test of all parameters of two results together for a difference, with their correlations.
 
     Args:
@@ -56,7 +58,8 @@ class JointContrast(TypedDict):
     parameters: int
 
 
-class ComparedPair(TypedDict):
+@dataclass(frozen=True)
+class ComparedPair:
     """Entry of compare.json for one result and the reference: differences of parameters, |K| and loss factor.
 
     Args:
@@ -70,13 +73,14 @@ class ComparedPair(TypedDict):
 
     reference: str
     other: str
-    shared_inputs: list[str]
+    shared_inputs: Sequence[str]
     joint: JointContrast | None
-    parameters: list[ParameterContrast]
-    places: dict[str, dict[str, list[Number | None] | list[Literal["yes", "no"]]]]
+    parameters: Sequence[ParameterContrast]
+    places: Mapping[str, Mapping[str, Sequence[Number | None] | Sequence[Literal["yes", "no"]]]]
 
 
-class HeldOutPart(TypedDict):
+@dataclass(frozen=True)
+class HeldOutPart:
     """Root mean square residuals of two model families, in units of noise, on a held-out part of the tests.
 
     Args:
@@ -90,7 +94,8 @@ class HeldOutPart(TypedDict):
     heldout: Number
 
 
-class FamilyEntry(TypedDict):
+@dataclass(frozen=True)
+class FamilyEntry:
     """Entry of compare.json for one model family (a set of effects): agreement, held-out error and probability.
 
     Args:
@@ -121,12 +126,13 @@ class FamilyEntry(TypedDict):
     gain: tuple[Number, Number, Number] | None
     p: Number | None
     probability: Number
-    parts: list[HeldOutPart]
-    skipped: list[Skipped]
+    parts: Sequence[HeldOutPart]
+    skipped: Sequence[Skipped]
     words: str
 
 
-class ComparisonFile(TypedDict):
+@dataclass(frozen=True)
+class ComparisonFile:
     """Content of compare.json: several results side by side, or model families on one campaign.
 
     Args:
@@ -141,10 +147,16 @@ class ComparisonFile(TypedDict):
     """
 
     schema: SchemaName
-    compared: list[ComparedEntry]
-    pairs: list[ComparedPair]
-    families: list[FamilyEntry] | None
-    words: list[str]
-    warnings: list[str]
+    compared: Sequence[ComparedEntry]
+    pairs: Sequence[ComparedPair]
+    families: Sequence[FamilyEntry] | None
+    words: Sequence[str]
+    warnings: Sequence[str]
     command: str
-    versions: dict[str, str]
+    versions: Mapping[str, str]
+
+    @property
+    def names(self) -> dict[str, str]:
+        """Name of each result by its label (A, B, ...); the source file or folder if two results have the same name."""
+        repeated = len({entry.name for entry in self.compared}) < len(self.compared)
+        return {entry.label: entry.source if repeated else entry.name for entry in self.compared}

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -17,8 +16,8 @@ from bushfit.errors import ModelError
 from bushfit.model.file import require_schema
 from bushfit.prediction.comparison import Comparison, Contrast
 from bushfit.prediction.parameter_comparison import ParameterContrast, relative_difference
-from bushfit.report.compare_document import SCHEMA, ComparisonFile
-from bushfit.report.tables import require_columns, response_headers
+from bushfit.report.compare_document import SCHEMA, ComparisonFile, FamilyEntry
+from bushfit.report.tables import response_headers
 from bushfit.units import display_unit, number, split_header
 from bushfit.validation import validate_tables
 
@@ -30,7 +29,9 @@ _OPEN = 1e7
 _LEAST_PROBABILITY = 1e-3
 #: Column header of the loss factor.
 LOSS = "loss factor [-]"
-#: Column headers of the rows of `ComparisonDocument.family_cells`.
+#: Column headers of the held-out gain of a family with its 95 % interval in families.csv.
+_GAIN_HEADERS = [f"fall of the mean square{end}" for end in ("", ", low", ", high")]
+#: Column headers of the rows of `family_cells`.
 FAMILY_HEADS = ("family", "parameters", "NRMSE", "χ²", "probability", "held out", "first, held out", "parts")
 
 
@@ -99,28 +100,24 @@ class PlaceDifferences:
         Args:
             label: letter of the result.
             place: name of the direction or specimen.
-            columns: columns of the table by header.
+            columns: columns of the table by header, in the order of `contrast_headers`.
 
         Returns:
             Table and headers.
 
         Raises:
-            ModelError: a column is missing, or columns have different lengths.
+            ModelError: a column is missing or empty, or columns have different lengths.
         """
-        texts = [name for name, cells in columns.items() if isinstance(next(iter(cells), None), str)]
-        sizes = {len(cells) for cells in columns.values()}
-        if len(sizes) != 1 or 0 in sizes or not all(name.endswith(", sure") for name in texts):
+        _, amplitude, stiffness, *_ = [*columns, *contrast_headers("", "")]
+        stiffness = stiffness.removeprefix("reference ")
+        if [*columns] != contrast_headers(amplitude, stiffness) or len({0, *map(len, columns.values())}) != 2:
             raise ModelError(
                 "the columns do not fit together",
                 place=f"pairs, {label}, places, {place}",
-                expected="equally long columns, with yes or no in columns whose names end in sure",
+                expected="the columns that bushfit compare writes, equally long",
             )
-        types = dict.fromkeys(columns.keys() - {*texts}, float)
+        types = {header: float for header in columns if not header.endswith(", sure")}
         table = pd.DataFrame({"other": label, "place": place, **columns}).astype(types)
-        amplitude = next((name for name in columns if split_header(name)[0].endswith("amplitude")), "amplitude [mm]")
-        stiffness = next((name for name in columns if name.startswith("reference ")), "stiffness [N/mm]")
-        stiffness = stiffness.removeprefix("reference ")
-        require_columns(table, *contrast_headers(amplitude, stiffness))
         return cls(label, place, table, amplitude, stiffness)
 
     def band(self, header: str) -> Array:
@@ -133,125 +130,111 @@ class PlaceDifferences:
         return self.table[["frequency [Hz]", self.amplitude]].to_numpy(dtype=float).T
 
 
-@dataclass(frozen=True, eq=False)
-class ComparisonDocument:
-    """Comparison of two or more results, or of model families, read from a validated `compare.json`."""
+def read_comparison(document: Mapping[str, Any], file: Path | None = None) -> ComparisonFile:
+    """Validate the content of a `compare.json`.
 
-    document: ComparisonFile
+    Args:
+        document: content of compare.json.
+        file: file that the document was read from, for error messages.
 
-    @classmethod
-    def from_document(cls, document: Mapping[str, Any], file: Path | None = None) -> ComparisonDocument:
-        """Validate the content of a `compare.json`.
+    Returns:
+        The comparison.
 
-        Args:
-            document: content of compare.json.
-            file: file that the document was read from, for error messages.
+    Raises:
+        ModelError: another schema, a missing or wrong key, or results that do not belong together.
+    """
+    require_schema(document, file, "a comparison", SCHEMA, hint="bushfit compare writes it again")
+    comparison = validate_tables(document, file, ComparisonFile, kind=ModelError)
+    first, *others = labels = [entry.label for entry in comparison.compared] or [""]
+    pairs = [(pair.reference, pair.other) for pair in comparison.pairs]
+    places = {tuple(pair.places) for pair in comparison.pairs}
+    families = [family.label for family in comparison.families or ()]
+    is_complete = others and len(set(labels)) == len(labels) and pairs == [(first, label) for label in others]
+    if not is_complete or len(places) != 1 or places == {()} or families not in ([], labels):
+        rule = "each result but the first compared with the first, at the same places"
+        raise ModelError("the results do not fit together", file=file, place="pairs", expected=rule)
+    return comparison
 
-        Returns:
-            The comparison.
 
-        Raises:
-            ModelError: another schema, a missing or wrong key, or results that do not belong together.
-        """
-        require_schema(document, file, "a comparison", SCHEMA, hint="bushfit compare writes it again")
-        checked = validate_tables(document, file, ComparisonFile, kind=ModelError)
-        first, *other_labels = [entry["label"] for entry in checked["compared"]] or [""]
-        families = checked["families"]
-        expected = [(first, label) for label in dict.fromkeys(other_labels) if label != first]
-        pairs = [(pair["reference"], pair["other"]) for pair in checked["pairs"]]
-        places = {tuple(pair["places"]) for pair in checked["pairs"]}
-        if not expected or len(expected) < len(other_labels) or pairs != expected or len(places) > 1 or () in places:
-            rule = "each result but the first compared with the first, at the same places"
-            raise ModelError("the results do not fit together", file=file, place="pairs", expected=rule)
-        if families and [family["label"] for family in families] != [first, *other_labels]:
-            raise ModelError("the families do not fit together", file=file, place="families", expected="all compared")
-        return cls(checked)
+def place_differences(comparison: ComparisonFile) -> dict[str, list[PlaceDifferences]]:
+    """Differences of each result but the reference, by name of the direction or specimen.
 
-    @cached_property
-    def names(self) -> dict[str, str]:
-        """Name of each result by its label (A, B, ...); the source file or folder if two results have the same name."""
-        compared = self.document["compared"]
-        repeated = len({entry["name"] for entry in compared}) < len(compared)
-        return {entry["label"]: entry["source"] if repeated else entry["name"] for entry in compared}
+    Raises:
+        ModelError: columns of a pair that do not go together.
+    """
+    pairs, columns = comparison.pairs, PlaceDifferences.from_columns
+    return {place: [columns(pair.other, place, pair.places[place]) for pair in pairs] for place in pairs[0].places}
 
-    @cached_property
-    def differences(self) -> dict[str, list[PlaceDifferences]]:
-        """Differences of each result from the reference, by name of the direction or specimen.
 
-        Raises:
-            ModelError: columns of a pair that do not match each other.
-        """
-        pairs, columns = self.document["pairs"], PlaceDifferences.from_columns
-        places = pairs[0]["places"]
-        return {place: [columns(pair["other"], place, pair["places"][place]) for pair in pairs] for place in places}
+def parameter_differences_table(comparison: ComparisonFile) -> pd.DataFrame:
+    """Table of the differences of parameters, parameters.csv: a row per parameter and pair of results."""
+    rows = [
+        {
+            "parameter": row.name,
+            "unit": row.unit,
+            "reference": pair.reference,
+            "other": pair.other,
+            "reference value": row.reference,
+            "other value": row.other,
+            "difference": row.difference,
+            "difference, low": row.interval and row.interval[0],
+            "difference, high": row.interval and row.interval[1],
+            "difference is": "relative" if row.relative else "absolute",
+            "p": row.p,
+            "p by Holm": row.holm,
+            "not tested": row.note,
+        }
+        for pair in comparison.pairs
+        for row in pair.parameters
+    ]
+    return pd.DataFrame(rows)
 
-    def tables(self) -> dict[str, pd.DataFrame]:
-        """Build the tables of the comparison for spreadsheets.
 
-        Returns:
-            Tables by name: `parameters` (a row per parameter and pair of results), `differences` (a row per operating
-            point and pair) and, if model families were compared, `families` (a row per family).
-        """
-        pairs = self.document["pairs"]
-        parameters = [
-            {
-                "parameter": row.name,
-                "unit": row.unit,
-                "reference": pair["reference"],
-                "other": pair["other"],
-                "reference value": row.reference,
-                "other value": row.other,
-                "difference": row.difference,
-                "difference, low": row.interval and row.interval[0],
-                "difference, high": row.interval and row.interval[1],
-                "difference is": "relative" if row.relative else "absolute",
-                "p": row.p,
-                "p by Holm": row.holm,
-                "not tested": row.note,
-            }
-            for pair in pairs
-            for row in pair["parameters"]
+def differences_table(comparison: ComparisonFile) -> pd.DataFrame:
+    """Table of the differences of stiffness and loss factor, differences.csv: a row per pair and operating point."""
+    by_result = zip(*place_differences(comparison).values(), strict=True)
+    return pd.concat([one.table for of_result in by_result for one in of_result], ignore_index=True)
+
+
+def families_table(families: Sequence[FamilyEntry]) -> pd.DataFrame:
+    """Table of the compared model families, families.csv: a row per family."""
+    rows = [
+        {
+            "label": family.label,
+            "family": family.name,
+            "parameters": family.parameters,
+            "reduced chi-square": family.reduced_chi_square,
+            "BIC less the first's": family.bic - families[0].bic,
+            "held out [noise]": family.heldout,
+            "the first there [noise]": family.first_there,
+            "parts held out": len(family.parts),
+            **dict(zip(_GAIN_HEADERS, family.gain or (None, None, None), strict=True)),
+            "p by Holm": family.p,
+            "probability": family.probability,
+            "words": family.words,
+        }
+        for family in families
+    ]
+    return pd.DataFrame(rows)
+
+
+def family_cells(comparison: ComparisonFile) -> Iterator[list[str]]:
+    """Rows of the table of model families (sets of effects, fitted to the same tests), as formatted texts.
+
+    Returns:
+        An iterator over the families: texts of name, parameters, agreement, probability and held-out error.
+    """
+    for family, entry in zip(comparison.families or (), comparison.compared, strict=False):
+        parts = len(family.parts)
+        yield [
+            f"{family.label}: {family.name.replace('+', ' + ')}",
+            str(family.parameters),
+            "" if entry.nrmse is None else f"{number(100.0 * entry.nrmse, 2)} %",
+            number(family.reduced_chi_square, 3),
+            f"{number(100.0 * family.probability, 2)} %" if family.probability >= 1e-3 else "< 0.1 %",
+            *("" if size is None else number(size, 3) for size in (family.heldout, family.first_there)),
+            f"{parts} of {parts + len(family.skipped)}",
         ]
-        by_result = zip(*self.differences.values(), strict=True)
-        differences = pd.concat([one.table for of_result in by_result for one in of_result], ignore_index=True)
-        tables = {"parameters": pd.DataFrame(parameters), "differences": differences}
-        families = []
-        for family in self.document["families"] or ():
-            gain = family["gain"] or (None, None, None)
-            row = {
-                "label": family["label"],
-                "family": family["name"],
-                "parameters": family["parameters"],
-                "reduced chi-square": family["reduced_chi_square"],
-                "BIC less the first's": family["bic"] - (self.document["families"] or [family])[0]["bic"],
-                "held out [noise]": family["heldout"],
-                "the first there [noise]": family["first_there"],
-                "parts held out": len(family["parts"]),
-                **dict(zip((f"fall of the mean square{end}" for end in ("", ", low", ", high")), gain, strict=True)),
-                "p by Holm": family["p"],
-                "probability": family["probability"],
-                "words": family["words"],
-            }
-            families.append(row)
-        return tables | ({"families": pd.DataFrame(families)} if families else {})
-
-    def family_cells(self) -> Iterator[list[str]]:
-        """Rows of the table of model families (sets of effects, fitted to the same tests), as formatted texts.
-
-        Returns:
-            An iterator over the families: texts of name, parameters, agreement, probability and held-out error.
-        """
-        for family, entry in zip(self.document["families"] or (), self.document["compared"], strict=False):
-            parts = len(family["parts"])
-            yield [
-                f"{family['label']}: {family['name'].replace('+', ' + ')}",
-                str(family["parameters"]),
-                "" if entry["nrmse"] is None else f"{number(100.0 * entry['nrmse'], 2)} %",
-                number(family["reduced_chi_square"], 3),
-                f"{number(100.0 * family['probability'], 2)} %" if family["probability"] >= 1e-3 else "< 0.1 %",
-                *("" if size is None else number(size, 3) for size in (family["heldout"], family["first_there"])),
-                f"{parts} of {parts + len(family['skipped'])}",
-            ]
 
 
 def parameter_cells(row: ParameterContrast) -> list[str]:

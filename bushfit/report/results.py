@@ -13,10 +13,10 @@ import json
 import os
 import re
 import uuid
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -39,33 +39,26 @@ _RECORD = ".bushfit.sha256"
 _CONTROL_CHARACTERS = re.compile(rf"(?!\n){CONTROL.pattern}")
 
 
-@dataclass(frozen=True, eq=False)
 class ResultFile:
     """One file of a result, whose content is computed when it is first needed.
 
     Args:
         name: file name without its extension; a raw file has its extension.
         kind: "json", "table", "figure", "page" (HTML) or "raw".
-        source: content, or function that makes it: a mapping, a pandas table, a chart, HTML text or bytes, by kind.
-        table: table that a figure shows, whose content `source` takes; None for other files.
+        content: content, or function that makes it: a mapping, a pandas table, a chart, HTML text or bytes, by kind.
+
+    Attributes:
+        content: function that returns the content; it computes the content once.
     """
 
-    name: str
-    kind: Kind
-    source: Any
-    table: ResultFile | None = None
-
-    @cached_property
-    def content(self) -> Any:
-        """Content of the file before encoding; it is computed once."""
-        if self.table:
-            return self.source(self.table.content)
-        return self.source() if callable(self.source) else self.source
+    def __init__(self, name: str, kind: Kind, content: Any) -> None:
+        self.name, self.kind = name, kind
+        self.content: Callable[[], Any] = cache(content if callable(content) else lambda: content)
 
 
 def contents(files: Iterable[ResultFile], kind: Kind) -> dict[str, Any]:
     """Contents of the result files of one kind, by file name without extension."""
-    return {file.name: file.content for file in files if file.kind == kind}
+    return {file.name: file.content() for file in files if file.kind == kind}
 
 
 def place_names(places: Iterable[Place]) -> list[str]:
@@ -112,32 +105,32 @@ class Formats:
             "figure": [f"{file.name}.{form}" for form in self.picture_forms] * self.pictures,
         }[file.kind]
 
-    def encode(self, file: ResultFile) -> dict[str, bytes]:
-        """Encode a result file as the bytes of its files on disk.
+    def encode(self, file: ResultFile, content: Any) -> dict[str, bytes]:
+        """Encode the content of a result file as the bytes of its files on disk.
+
+        Args:
+            file: result file of a kind that is not omitted.
+            content: its content.
 
         Returns:
-            Bytes by file name with extension; empty if the kind is omitted.
+            Bytes by file name with extension.
 
         Raises:
             OutputError: a table that is too large for its format.
         """
-        names = self.names(file)
-        if not names:
-            return {}
-        content = file.content
         if file.kind == "figure":
-            forms = zip(names, self.picture_forms, strict=True)
-            return {name: plots.style.to_image(content, form) for name, form in forms}
+            return {f"{file.name}.{form}": plots.style.to_image(content, form) for form in self.picture_forms}
         if file.kind == "table":
             content = to_bytes(file.name, content, self.table_form)
         elif file.kind != "raw":
             content = to_json(content) if file.kind == "json" else content.encode()
-        return {names[0]: content}
+        return {self.names(file)[0]: content}
 
 
 def encode_all(files: Iterable[ResultFile], formats: Formats) -> dict[str, bytes]:
     """Encode all files of a result: bytes by file name with extension."""
-    return {name: content for file in files for name, content in formats.encode(file).items()}
+    written = [file for file in files if formats.names(file)]
+    return {name: data for file in written for name, data in formats.encode(file, file.content()).items()}
 
 
 def to_json(document: Mapping[str, Any]) -> bytes:
@@ -172,11 +165,12 @@ def write_results(
         OutputError: the folder cannot be written, or holds a file that must not be replaced.
     """
     formats = formats or Formats()
-    ordered = sorted(files, key=lambda file: _KINDS.index(file.kind))
+    written = [file for file in files if formats.names(file)]
+    ordered = sorted(written, key=lambda file: _KINDS.index(file.kind))
     names = [name for file in ordered for name in formats.names(file)]
     check_free(folder, names, overwrite=overwrite, inputs=inputs)
     for file in track("files made", ordered):
-        write_files(folder, formats.encode(file))
+        write_files(folder, formats.encode(file, file.content()))
     return names
 
 

@@ -1,7 +1,9 @@
 """A batch as a whole: who differs and by what, the measured curves, capability; how often a part is named by chance."""
 
+import html
 import json
 import math
+import re
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -15,6 +17,7 @@ from scipy import stats
 from bushfit.batch.comparison import capability, find_outliers, smallest_deviation
 from bushfit.batch.document import Estimate, RowFile
 from bushfit.batch.summary import BatchResult
+from bushfit.report.page.index import summarize_warnings
 
 
 @pytest.fixture(scope="module")
@@ -57,6 +60,20 @@ def test_the_measured_curve_ends_the_table(made, table):
     assert measured[3] == pytest.approx(at_point["stiffness [N/mm]"].mean(), rel=1e-6)
     deviation = np.exp(np.log(table[curve] / table[curve].median()).mean(axis=1)) - 1.0
     assert np.allclose(table["measured stiffness off the median [%]"], 100.0 * deviation, atol=1e-3)
+
+
+def test_the_page_lists_a_warning_once_with_the_number_of_its_parts(made, document):
+    page = html.unescape((made / "out/index.html").read_text(encoding="utf-8"))
+    listed = page.partition('<ol class="warnings">')[2].partition("</ol>")[0].split("</li>")[:-1]
+    kinds: dict[str, set[str]] = {}
+    for part in document["parts"]:
+        for line in part["warnings"]:
+            kinds.setdefault(re.sub(r"[-+\d.]+", "", line), set()).add(part["name"])
+    heads = [line.removeprefix("<li>").partition(": ")[0] for line in listed]
+    wanted = [f"{len(names)} parts" if len(names) > 1 else min(names) for names in kinds.values()]
+    assert sorted(heads) == sorted(wanted)
+    pair = [("P1", "a gap of 1.5 %"), ("P2", "a gap of 2 %")]
+    assert summarize_warnings(pair) == "2 parts: a gap of 1.5 % (and 1 more with other numbers)"
 
 
 def test_capability_is_that_of_fixed_limits(table, document):

@@ -137,7 +137,7 @@ def test_predict_writes_the_static_curve_at_the_rate_of_the_slowest_loop(bushfit
     found = json.loads(done.stdout)
     assert found["axial_static"]["force [N]"] == pytest.approx(table["force [N]"].tolist(), rel=1e-5, abs=1e-6)
     secant = table["force [N]"].iloc[-1] / table["displacement [mm]"].iloc[-1]
-    assert f"axial: static stiffness {secant:.4g} N/mm from -1 mm to 1 mm at {slow:.3g} mm/min" in done.stderr
+    assert f"axial: static stiffness {secant:.4g} N/mm from -1 mm to 1 mm at {slow:.3g} mm/min (95 %: " in done.stderr
     options = ("--direction", "axial", "--amplitudes", "0.2 mm", "--static-rate", "5 mm/min", "--no-plots")
     bushfit("predict", "model/model.json", *options, "-o", tmp_path / "y")
     slower = pd.read_csv(tmp_path / "y/axial_static.csv")

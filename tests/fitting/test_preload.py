@@ -202,7 +202,7 @@ def test_static_curves_and_comparisons_are_about_a_preload():
     output = predict_files(
         result, preloads=["300 N", "700 N"], amplitudes=[reach], static=True, static_rates={"m": rate}
     )
-    (table,) = (file.content for file in output.files if (file.name, file.kind) == ("axial_static", "table"))
+    (table,) = (file.content() for file in output.files if (file.name, file.kind) == ("axial_static", "table"))
     both = table.groupby("preload [N]")["stiffness [N/mm]"].median()
     assert both.index.tolist() == [300.0, 700.0]
     assert both[700.0] == pytest.approx(1e-3 * np.median(curve.slope.value), rel=1e-6)

@@ -78,7 +78,7 @@ def test_factors_of_three_shapes_are_recovered_and_read_back(tmp_path):
 def test_each_bushing_is_predicted_by_the_others(factor, band, tmp_path):
     """The spread of free factors holds a bushing 4 % stiffer than its formula; equal factors do not."""
     output = fit(simulated(tmp_path, factor=factor))
-    (table,) = (part.content for part in output.files if part.name == "bushings")
+    (table,) = (part.content() for part in output.files if part.name == "bushings")
     rows = table.set_index("bushing")
     assert [*rows.index] == [*SHAPES]
     assert (rows["points"] == 24).all()

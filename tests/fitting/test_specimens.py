@@ -139,7 +139,7 @@ def test_shift_factors_are_those_of_the_law_where_it_holds(clean):
         line = result.model.stiffness(Direction.AXIAL, each.reduced_frequency, each.sweep.amplitude)
         assert np.max(np.abs(each.reduced_stiffness / line - 1.0)) < 0.02
     tables = {file.name: file for file in campaign_files(data, result) if file.kind == "table"}
-    factors, curve = (tables[name].content for name in ("shift_factors", "master_curve"))
+    factors, curve = (tables[name].content() for name in ("shift_factors", "master_curve"))
     assert len(factors) == len(DEGREES)
     assert len(curve) == sum(each.sweep.frequency.size for each in found)
     assert factors["log10 a_T [-]"].to_numpy() == pytest.approx([each.shift[0] / np.log(10.0) for each in found])

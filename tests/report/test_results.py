@@ -207,7 +207,7 @@ def outputs(root, tmp_path_factory) -> dict[str, list[ResultFile]]:
 def test_pictures_and_sheets(command, outputs):
     files, texts, cells = outputs[command], list[str](), list[Any]()
     for file in (file for file in files if file.kind == "figure"):
-        figure = file.content
+        figure = file.content()
         to_image(figure)
         drawn = figure.findobj(Text)
         assert not [text.get_text() for text in drawn if text._preprocess_math(text.get_text())[1]], "mathematics"

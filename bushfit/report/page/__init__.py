@@ -79,7 +79,7 @@ def folder_pages(folder: Path, base: str = "", date: str | None = None) -> list[
         ModelError: a folder without results, or a file in it that is not as bushfit writes it.
     """
     from bushfit.report.batch_document import BATCH_SCHEMA, BatchFile
-    from bushfit.report.compared import ComparisonDocument
+    from bushfit.report.compared import read_comparison
     from bushfit.report.page.comparison import comparison_page
     from bushfit.report.page.index import index_page
     from bushfit.report.page.record import MODELS, read_results
@@ -92,7 +92,7 @@ def folder_pages(folder: Path, base: str = "", date: str | None = None) -> list[
         return [ResultFile("index", "page", partial(index_page, batch, folder, base))]
     pages = []
     if (file := folder / "compare.json").exists():
-        comparison = ComparisonDocument.from_document(read_document(file), file)
+        comparison = read_comparison(read_document(file), file)
         pages.append(ResultFile("compare", "page", partial(comparison_page, comparison)))
     if not pages or any((folder / f"{name}.json").exists() for name in MODELS):
         pages.append(ResultFile("report", "page", partial(report_page, read_results(folder), date, folder)))

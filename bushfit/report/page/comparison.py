@@ -1,19 +1,21 @@
 """Content of the page of a comparison: parameters, stiffness and loss factor side by side, and their differences."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from bushfit.report import plots
+from bushfit.report.compare_document import ComparisonFile
 from bushfit.report.compared import (
     FAMILY_HEADS,
     LOSS,
-    ComparisonDocument,
     PlaceDifferences,
+    family_cells,
     format_difference,
     format_p_value,
     parameter_cells,
+    place_differences,
 )
 from bushfit.report.page import render_page
 from bushfit.report.page.report import MOST, group_warnings, summarize_conditions
@@ -30,7 +32,7 @@ _FREQUENCIES, _AMPLITUDES, _ROWS = 3, 2, 24
 _CONDITIONS = ("Temperature", "Preload")
 
 
-def comparison_page(comparison: ComparisonDocument, chart: ResultFile | None = None) -> str:
+def comparison_page(comparison: ComparisonFile, chart: ResultFile | None = None) -> str:
     """Make the HTML page of a comparison.
 
     Args:
@@ -40,21 +42,20 @@ def comparison_page(comparison: ComparisonDocument, chart: ResultFile | None = N
     Returns:
         The page as HTML.
     """
-    document, names, differences = comparison.document, comparison.names, comparison.differences
-    compared = document["compared"]
-    conditions = [summarize_conditions(source.conditions for source in entry["inputs"]) for entry in compared]
+    names, compared, differences = comparison.names, comparison.compared, place_differences(comparison)
+    conditions = [summarize_conditions(source.conditions for source in entry.inputs) for entry in compared]
     labels: dict[tuple[str, str], list[str]] = {}
     for entry in compared:
-        inputs = [(str(source.file), source.sha256) for source in entry["inputs"]]
-        for file, sha256 in dict.fromkeys([(entry["source"], entry["sha256"]), *inputs]):
+        inputs = [(str(source.file), source.sha256) for source in entry.inputs]
+        for file, sha256 in dict.fromkeys([(entry.source, entry.sha256), *inputs]):
             if sha256:
-                labels.setdefault((file, sha256), []).append(entry["label"])
+                labels.setdefault((file, sha256), []).append(entry.label)
     pictures = []
     if len(names) * len(differences) <= _MOST_DRAWN:
-        figure = chart.content if chart else plots.comparison.comparison_figure(comparison)
+        figure = chart.content() if chart else plots.comparison.comparison_figure(comparison)
         pictures.append(picture(figure, "compare", figure.heading.get_text()))
     context = {
-        "document": document,
+        "document": comparison,
         "names": names,
         "resisted": "modulus"
         if all(results[0].stiffness.startswith("modulus") for results in differences.values())
@@ -63,13 +64,13 @@ def comparison_page(comparison: ComparisonDocument, chart: ResultFile | None = N
         "differ": [name for name in _CONDITIONS if len({stated[name] for stated in conditions}) > 1],
         "sizes": [difference_sizes(one) for of_place in differences.values() for one in of_place],
         "family_heads": FAMILY_HEADS,
-        "family_rows": [*comparison.family_cells()],
+        "family_rows": [*family_cells(comparison)],
         "most": MOST,
         "cells": parameter_cells,
         "chance": format_p_value,
         "pictures": pictures,
-        "tabled": [*value_rows(comparison)][: 2 * _ROWS],
-        "warnings": group_warnings(document["warnings"]),
+        "tabled": [*value_rows(differences)][: 2 * _ROWS],
+        "warnings": group_warnings(comparison.warnings),
         "files": [(f"{', '.join(letters)}: {file}", sha256) for (file, sha256), letters in labels.items()],
     }
     return render_page("compare.html", context)
@@ -96,17 +97,17 @@ def difference_sizes(one: PlaceDifferences) -> dict[str, str]:
     return row
 
 
-def value_rows(comparison: ComparisonDocument) -> Iterator[tuple[Any, ...]]:
-    """Rows of the table of values: the first result and every other result at a few operating points.
+def value_rows(differences: Mapping[str, Sequence[PlaceDifferences]]) -> Iterator[tuple[Any, ...]]:
+    """Rows of the table of values: the first result and each other one at a few operating points.
 
     Args:
-        comparison: validated comparison.
+        differences: differences of each result from the first, by direction or specimen.
 
     Yields:
         Direction or specimen, label, frequency, amplitude; then for stiffness and for loss factor a tuple: both values,
         difference, 95 % interval of the difference, and True if it is significant when all points are tested together.
     """
-    all_differences = [one for of_place in comparison.differences.values() for one in of_place]
+    all_differences = [one for of_place in differences.values() for one in of_place]
     point_limit = max(_ROWS // max(len(all_differences), 1), 1)
     amplitudes = min(point_limit, _AMPLITUDES)
     for one in all_differences:

@@ -1,11 +1,13 @@
 """Content of the page of a batch, `index.html`: parts that fail or differ, statistics, and a table of all parts."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
 import numpy as np
 
+from bushfit.prediction.caveats import without_numbers
 from bushfit.report import plots
 from bushfit.report.batch_document import BatchFile, PartTable
 from bushfit.report.page import render_page
@@ -42,6 +44,7 @@ def index_page(batch: BatchFile, folder: Path, base: str = "") -> str:
     has_curves = bool(usual.any())
     relative = curves / np.nanmedian(curves, axis=0) - 1.0 if has_curves else curves
     scale = max(_LEAST_SCALE, 1.5 * float(np.abs(relative[usual]).max())) if has_curves else 0.0
+    heights = np.clip(relative / scale, -1.0, 1.0) if has_curves else relative
     status, links, listed = list[str](), list[str](), {name: list[tuple[PartTable, str]]() for name in _ORDER}
     for part in parts:
         differs = part.deviations and part.result in (None, "pass", "conditional pass")
@@ -58,12 +61,17 @@ def index_page(batch: BatchFile, folder: Path, base: str = "") -> str:
     important = sum(map(bool, status))
     first, ordinary = ordered[: min(important, row_limit)], ordered[important:]
     chosen = first + [ordinary[index] for index in spread_indices(len(ordinary), max(0, row_limit - len(first)))]
-    warnings = list(dict.fromkeys(line for index in chosen for line in parts[index].warnings))
-    rows = []
+    rows, warnings = list[tuple[Any, ...]](), dict[str, list[tuple[str, str]]]()
+    for part in (parts[index] for index in chosen):
+        for line in part.warnings:
+            warnings.setdefault(without_numbers(line), []).append((part.name, line))
+    numbers = {kind: number for number, kind in enumerate(warnings, start=1)}
     for index in chosen:
         is_known = has_curves and np.isfinite(relative[index]).all()
         mean = 100.0 * np.expm1(np.log1p(relative[index]).mean()) if is_known else None
-        rows.append((parts[index], links[index], relative[index].tolist() if is_known else [], mean))
+        notes = sorted({numbers[without_numbers(line)] for line in parts[index].warnings})
+        curve, drawn = (lines[index].tolist() if is_known else [] for lines in (relative, heights))
+        rows.append((parts[index], links[index], curve, drawn, mean, notes))
     pictures = []
     if has_curves:
         singles = {part.name: curves[k] for k, part in enumerate(parts) if part.curve and not usual[k]}
@@ -78,12 +86,23 @@ def index_page(batch: BatchFile, folder: Path, base: str = "") -> str:
         "parts_compared": max((table.parts for table in compared), default=0),
         "units": units,
         "scale": scale,
-        "band": [relative[usual].min(axis=0).tolist(), relative[usual].max(axis=0).tolist()] if has_curves else [],
+        "band": [heights[usual].min(axis=0).tolist(), heights[usual].max(axis=0).tolist()] if has_curves else [],
         "pictures": pictures,
         "labels": labels,
         "columns": ["measured stiffness, deviation [%]"] * has_curves + [*batch.quantities],
         "rows": rows,
-        "warnings": warnings,
+        "warnings": [summarize_warnings(named) for named in warnings.values()],
         "shown": (len(first), important, len(chosen) - len(first)),
     }
     return render_page("index.html", context)
+
+
+def summarize_warnings(named: Sequence[tuple[str, str]]) -> str:
+    """Sentence on the warnings of one kind: their parts, the first of them, and how many have other numbers.
+
+    Args:
+        named: name of the part and text of each warning.
+    """
+    names, lines = (list(dict.fromkeys(column)) for column in zip(*named, strict=True))
+    more = f" (and {len(lines) - 1} more with other numbers)" if len(lines) > 1 else ""
+    return f"{names[0] if len(names) == 1 else f'{len(names)} parts'}: {lines[0]}{more}"

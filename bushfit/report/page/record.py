@@ -1,10 +1,9 @@
-"""Input of a report: model, diagnosis, tables and figures of a result, from a run or read from its folder."""
+"""Input of a report: documents and tables read from a results folder, tables of tests, and predictions."""
 
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 from zipfile import BadZipFile
@@ -12,23 +11,18 @@ from zipfile import BadZipFile
 import numpy as np
 import pandas as pd
 
-from bushfit.diagnosis.document import DiagnosisFile
 from bushfit.errors import ModelError
 from bushfit.geometry import Direction, Place
-from bushfit.model.document import CampaignTable
-from bushfit.model.file import from_document, read_document, require_schema
+from bushfit.model.file import from_document, read_document
 from bushfit.model.result import Result
 from bushfit.prediction.stiffness import Prediction, predict
 from bushfit.reading.files import read_utf8
 from bushfit.reading.tablefile import unescape_formula
-from bushfit.report.results import ResultFile, contents, place_names
+from bushfit.report.results import ResultFile, place_names
 from bushfit.report.tables import require_columns, response_headers, spread_indices
-from bushfit.validation import validate_tables
 
 #: Documents with a model in order of preference; document of the fit without the effects that a diagnosis added.
 MODELS, JOINT = ("model", "dynamic", "static"), "joint"
-#: Schema of diagnosis.json.
-DIAGNOSIS = "bushfit/diagnosis/3"
 #: Headers of columns of texts; all other columns contain numbers.
 _TEXTS = ("loop", "sweep", "test", "kind", "direction", "stepped", "part", "outlier")
 #: Largest number of frequencies, and of amplitudes, of a grid that is made from the measured points.
@@ -37,74 +31,7 @@ _MOST_LEVELS = 10
 _LARGEST = 500_000_000
 
 
-@dataclass(frozen=True, eq=False)
-class ReportRecord:
-    """Input of a report: model, diagnosis, tables, predictions and figures of a result.
-
-    Args:
-        result: final model.
-        joint: fit without the effects that a diagnosis added; None if there is none.
-        campaign: campaign, as the model file describes it; None if it is not known.
-        diagnosis: content of diagnosis.json; None without a diagnosis.
-        versions: versions of bushfit and of the numerical packages in use, by name.
-        tables: tables that are known: `gap` (measured minus model), measured and modelled `sweeps` and
-            `loops`, and validation records.
-        predictions: predictions for all directions and specimens that were tested or predicted, by file name.
-        charts: figures made in the run, by file name; other figures are made from the tables.
-    """
-
-    result: Result
-    joint: Result | None
-    campaign: CampaignTable | None
-    diagnosis: DiagnosisFile | None
-    versions: Mapping[str, str]
-    tables: Mapping[str, pd.DataFrame]
-    predictions: Mapping[str, Prediction]
-    charts: Mapping[str, ResultFile]
-
-
-def report_record(files: Sequence[ResultFile], folder: Path | None = None) -> ReportRecord:
-    """Collect the input of a report from the files of a result, and compute the predictions from the model.
-
-    Args:
-        files: documents (model, fit without the effects of a diagnosis, diagnosis), tables (loops, sweeps, gap, and one
-            per predicted direction or specimen, which gives the grid of the prediction) and figures.
-        folder: folder of the documents, for error messages; None for documents that were not read from files.
-
-    Returns:
-        Model, documents, tables, predictions and figures for `report_page`.
-
-    Raises:
-        ModelError: no model among the documents, or a document or table that is not as bushfit writes it.
-    """
-    documents, tables = contents(files, "json"), contents(files, "table")
-    paths = {name: folder / f"{name}.json" for name in documents} if folder else {}
-    name = next((name for name in MODELS if name in documents), None)
-    if name is None:
-        raise ModelError("there is no model among the results", expected=" or ".join(f"{name}.json" for name in MODELS))
-    model, joint, diagnosis = documents[name], documents.get(JOINT), documents.get("diagnosis")
-    result = from_document(model, paths.get(name))
-    if diagnosis is not None:
-        hint = "bushfit diagnose writes it again"
-        require_schema(diagnosis, paths.get("diagnosis"), "a diagnosis", DIAGNOSIS, hint=hint)
-        diagnosis = validate_tables(diagnosis, paths.get("diagnosis"), DiagnosisFile, kind=ModelError)
-    campaign, provenance = model.get("campaign"), model.get("provenance", {})
-    if campaign:
-        campaign = validate_tables(campaign, paths.get(name), CampaignTable, "campaign", kind=ModelError)
-    tested = _tests(tables)
-    return ReportRecord(
-        result,
-        from_document(joint, paths.get(JOINT)) if joint else None,
-        campaign or None,
-        diagnosis,
-        {"bushfit": provenance.get("bushfit") or "", **provenance.get("packages", {})},
-        tested,
-        _predictions(result, tables, tested.get("sweeps")),
-        {file.name: file for file in files if file.kind == "figure"},
-    )
-
-
-def _tests(tables: Mapping[str, pd.DataFrame]) -> dict[str, pd.DataFrame]:
+def tested_tables(tables: Mapping[str, pd.DataFrame]) -> dict[str, pd.DataFrame]:
     """Select the tables of measured and modelled tests: `gap`, `sweeps`, `loops`, and validation records.
 
     A diagnosis writes no tables of sweeps and loops. Its table of the gap has the same columns, with a row for each
@@ -130,7 +57,7 @@ def _tests(tables: Mapping[str, pd.DataFrame]) -> dict[str, pd.DataFrame]:
     return tested | {name: table for name, table in tables.items() if name.startswith("validation_")}
 
 
-def _predictions(
+def predict_tables(
     result: Result, tables: Mapping[str, pd.DataFrame], sweeps: pd.DataFrame | None
 ) -> dict[str, Prediction]:
     """Compute a prediction on the grid of each prediction table, by its file name; without tables, on the sweeps' grid.

@@ -10,25 +10,33 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
+from bushfit.diagnosis.document import DiagnosisFile
 from bushfit.diagnosis.record import format_odds
 from bushfit.effects.temperature import REFERENCE
+from bushfit.errors import ModelError
 from bushfit.geometry import STRAINING, TRANSLATION
+from bushfit.model.document import CampaignTable
+from bushfit.model.file import from_document, require_schema
 from bushfit.model.result import Result
 from bushfit.prediction.caveats import agrees_within_noise, by_importance, consequence_of, warnings_of
+from bushfit.prediction.stiffness import Prediction
 from bushfit.reading.measurement import SAME_TEMPERATURE
 from bushfit.report import plots
 from bushfit.report.page import render_page
-from bushfit.report.page.record import ReportRecord, report_record
+from bushfit.report.page.record import JOINT, MODELS, predict_tables, tested_tables
 from bushfit.report.page.svg import Picture, picture
 from bushfit.report.page.values import headline_texts, value_rows
 from bushfit.report.parameters import correlation_texts, effect_sizes, parameter_rows
-from bushfit.report.results import ResultFile
+from bushfit.report.results import ResultFile, contents
 from bushfit.report.tables import DISPLAYS, missing_column
 from bushfit.units import CELSIUS, number
+from bushfit.validation import validate_tables
 
 if TYPE_CHECKING:
     from bushfit.report.plots.style import Chart
 
+#: Schema of diagnosis.json.
+DIAGNOSIS = "bushfit/diagnosis/3"
 #: Label of each test condition by campaign key; temperature, preload and date are listed even if they are not stated.
 _CONDITIONS = {
     "temperature_degC": "Temperature",
@@ -56,18 +64,30 @@ def report_page(files: Sequence[ResultFile], date: str | None = None, folder: Pa
         The page as HTML.
 
     Raises:
-        ModelError: no model among the documents, or a document or table that is not as bushfit writes it.
+        ModelError: a document or table that is not as bushfit writes it.
     """
-    record = report_record(files, folder)
-    result, diagnosis, campaign = record.result, record.diagnosis, record.campaign
+    documents, tables = contents(files, "json"), contents(files, "table")
+    paths = {name: folder / f"{name}.json" for name in documents} if folder else {}
+    name = next(name for name in MODELS if name in documents)
+    model, provenance = documents[name], documents[name].get("provenance", {})
+    result, joint = from_document(model, paths.get(name)), documents.get(JOINT)
+    plain = from_document(joint, paths.get(JOINT)) if joint else result
+    is_extended = plain.model.effects != result.model.effects  # else joint.json is of an earlier run
+    campaign, diagnosis = model.get("campaign") or None, documents.get("diagnosis")
+    if campaign:
+        campaign = validate_tables(campaign, paths.get(name), CampaignTable, "campaign", kind=ModelError)
+    if diagnosis:
+        file, hint = paths.get("diagnosis"), "bushfit diagnose writes it again"
+        require_schema(diagnosis, file, "a diagnosis", DIAGNOSIS, hint=hint)
+        diagnosis = validate_tables(diagnosis, file, DiagnosisFile, kind=ModelError)
     head = {**(campaign.report if campaign else {}), **({"date": date} if date else {})}
-    tests = campaign.tests if campaign else ()
-    predictions = [*record.predictions.values()][:_MOST_PLACES]
-    place_warnings = [prediction.warnings for prediction in record.predictions.values()]
+    tested = tested_tables(tables)
+    by_name, tests = predict_tables(result, tables, tested.get("sweeps")), campaign.tests if campaign else ()
+    predictions = [*by_name.values()][:_MOST_PLACES]
+    place_warnings = [prediction.warnings for prediction in by_name.values()]
     warnings = warnings_of(result, place_warnings, diagnosis["warnings"] if diagnosis else ())
-    pictures, left_out = draw_figures(record)
-    plain = record.joint  # of an earlier run if no effect was added
-    plain = plain if plain and plain.model.effects != result.model.effects else None
+    charts = {file.name: file for file in files if file.kind == "figure"}
+    pictures, left_out = draw_figures(result, diagnosis, tested, by_name, charts)
     sizes = [p.stiffness.value for p in predictions if p.direction.motion is TRANSLATION]
     ends = [20.0 * math.log10(end) for end in (min(map(np.min, sizes)), max(map(np.max, sizes)))] if sizes else []
     sources: list[Any] = [*([campaign] if campaign else []), *tests, *result.inputs]
@@ -75,7 +95,7 @@ def report_page(files: Sequence[ResultFile], date: str | None = None, folder: Pa
         "result": result,
         "campaign": campaign,
         "diagnosis": diagnosis,
-        "versions": record.versions,
+        "versions": {"bushfit": provenance.get("bushfit") or "", **provenance.get("packages", {})},
         "head": {key.replace("_", " ").capitalize(): text for key, text in head.items()},
         "conditions": summarize_conditions(test.conditions for test in tests),
         "headlines": [headline_texts(result, prediction) for prediction in predictions],
@@ -85,7 +105,7 @@ def report_page(files: Sequence[ResultFile], date: str | None = None, folder: Pa
         "pictures": pictures,
         "left_out": left_out,
         "rows": list(parameter_rows(result)),
-        "plain": {row.name: row.value for row in parameter_rows(plain)} if plain else {},
+        "plain": {row.name: row.value for row in parameter_rows(plain)} if is_extended else {},
         "correlations": correlation_texts(result),
         "tests": tests[:MOST],
         "agreement": {misfit.test: misfit for misfit in result.tests if misfit.held is None},
@@ -100,24 +120,33 @@ def report_page(files: Sequence[ResultFile], date: str | None = None, folder: Pa
     return render_page("report.html", context)
 
 
-def draw_figures(record: ReportRecord) -> tuple[list[Picture], bool]:
+def draw_figures(
+    result: Result,
+    diagnosis: DiagnosisFile | None,
+    tables: Mapping[str, pd.DataFrame],
+    predictions: Mapping[str, Prediction],
+    charts: Mapping[str, ResultFile],
+) -> tuple[list[Picture], bool]:
     """Draw the figures of a report, as many as fit the size limit of the page.
 
     The figures are predictions with measurements, measured minus model (without a diagnosis: sweeps and their
     residuals), loops, and validation records.
 
     Args:
-        record: input of the report.
+        result: final model.
+        diagnosis: content of diagnosis.json; None without a diagnosis.
+        tables: tables from `tested_tables`.
+        predictions: predictions for directions and specimens by file name.
+        charts: figures made in the run, by file name; other figures are made from the tables.
 
     Returns:
         Figures of the report, and True if further figures are left out.
     """
-    result, diagnosis = record.result, record.diagnosis
-    sweeps, loops, gap = (record.tables.get(name) for name in ("sweeps", "loops", "gap"))
+    sweeps, loops, gap = (tables.get(name) for name in ("sweeps", "loops", "gap"))
     drawn_sweeps, title = comparable_sweeps(sweeps, result), result.name
     # file name, heading, function and its arguments
     figures: list[tuple[str, str, Callable[..., Chart], tuple[Any, ...]]] = []
-    for name, prediction in [*record.predictions.items()][:_MOST_PLACES]:
+    for name, prediction in [*predictions.items()][:_MOST_PLACES]:
         heading, draw = f"{prediction.direction}: prediction and measurement", plots.prediction.prediction_figure
         figures.append((name, heading, draw, (result, prediction, drawn_sweeps, title)))
     if gap is not None and diagnosis is not None:
@@ -126,14 +155,14 @@ def draw_figures(record: ReportRecord) -> tuple[list[Picture], bool]:
         figures.append(("sweeps", "Sweeps and their residuals", plots.fits.sweeps_figure, (result, sweeps, title)))
     if loops is not None:
         figures.append(("loops", "Hysteresis loops", plots.fits.loops_figure, (result, loops, title)))
-    for name, table in record.tables.items():
+    for name, table in tables.items():
         if name.startswith("validation_"):
             heading = f"Validation record {name.removeprefix('validation_')}, never fitted"
             figures.append((name, heading, plots.response.response_figure, (title, table)))
     pictures, room = list[Picture](), _LARGEST_FIGURES
     for name, heading, draw, arguments in figures:
         try:
-            chart = record.charts[name].content if name in record.charts else draw(*arguments)
+            chart = charts[name].content() if name in charts else draw(*arguments)
         except KeyError as error:
             if not isinstance(error.__cause__, KeyError):  # pandas chains the error of a missing header
                 raise
@@ -143,7 +172,7 @@ def draw_figures(record: ReportRecord) -> tuple[list[Picture], bool]:
         if room <= 0:
             break
         pictures.append(drawing)
-    return pictures, len(pictures) < len(figures) or len(record.predictions) > _MOST_PLACES
+    return pictures, len(pictures) < len(figures) or len(predictions) > _MOST_PLACES
 
 
 def comparable_sweeps(sweeps: pd.DataFrame | None, result: Result) -> pd.DataFrame | None:

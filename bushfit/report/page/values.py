@@ -58,17 +58,19 @@ def headline_texts(result: Result, prediction: Prediction) -> dict[str, str]:
         "loss_factor_band": format_interval(loss, 3),
         "loss_angle": f"{format_aligned([math.degrees(math.atan(loss[0]))], 3)[0]}°",
         "static": "not tested",
+        "static_band": "",
         "static_point": f"lowest frequency {number(lowest, 3)} Hz",
         "stiffening": "",
     }
     if lowest < frequency and lowest <= _STATIC and not untimed_effects(result.model):
         curve = static_curve(result, place, amplitude, static_rate(result, place))
-        static, ratio = to_unit * float(curve.secant.value[0]), float(point.stiffness.value[0] / curve.secant.value[0])
+        static, ratio = band_at(curve.secant, 0, to_unit), float(point.stiffness.value[0] / curve.secant.value[0])
         relative = [band.root[:, 0] / band.value[0] for band in (point.stiffness, curve.secant)]
         # the errors of a smooth correction differ between the two frequencies
         spread = np.concatenate(relative) if result.model.unnamed else relative[0] - relative[1]
         half = Z95 * ratio * float(np.linalg.norm(spread))
-        row["static"], row["static_point"] = f"{format_aligned([static], 4)[0]} {unit}", f"at {curve.rate_text}"
+        row |= {"static": f"{format_aligned(static[:1], 4)[0]} {unit}", "static_band": format_interval(static)}
+        row["static_point"] = f"at {curve.rate_text}"
         decimals = max(2, math.ceil(-math.log10(2.0 * half))) if half else 2  # the interval is not rounded to 0
         row["stiffening"] = f"{ratio:.{decimals}f}" + (f" ± {half:.{decimals}f}" if half else "")
     return row

@@ -3,7 +3,8 @@
 import numpy as np
 from matplotlib.lines import Line2D
 
-from bushfit.report.compared import LOSS, ComparisonDocument
+from bushfit.report.compare_document import ComparisonFile
+from bushfit.report.compared import LOSS, place_differences
 from bushfit.report.plots import style
 from bushfit.report.tables import shorten
 from bushfit.units import display_unit, format_range, split_header
@@ -17,7 +18,7 @@ _LEAST_PERCENT, _LEAST_LOSS = 1.0, 0.005
 
 
 @style.fixed_settings()
-def comparison_figure(comparison: ComparisonDocument) -> style.Chart:
+def comparison_figure(comparison: ComparisonFile) -> style.Chart:
     """Figure of stiffness and loss factor of all compared results, and of their differences from the first result.
 
     Curves are over frequency at the smallest and largest amplitude, or over amplitude if there is only one frequency.
@@ -28,11 +29,11 @@ def comparison_figure(comparison: ComparisonDocument) -> style.Chart:
     Returns:
         Figure with four panels per direction or specimen: values above, differences below.
     """
-    first, *other_labels = comparison.names
-    figure = style.Chart(f"{', '.join(other_labels)} against {first}", 2 * len(comparison.differences) * style.ROW)
-    grid = figure.subplots(2 * len(comparison.differences), 2, squeeze=False)
+    (first, *other_labels), by_place = comparison.names, place_differences(comparison)
+    figure = style.Chart(f"{', '.join(other_labels)} against {first}", 2 * len(by_place) * style.ROW)
+    grid = figure.subplots(2 * len(by_place), 2, squeeze=False)
     looks = dict(zip(comparison.names, style.styles(len(comparison.names), "loop"), strict=True))
-    for row, (place, differences) in enumerate(comparison.differences.items()):
+    for row, (place, differences) in enumerate(by_place.items()):
         reference = differences[0]
         over_frequency = bool(np.ptp(reference.grid()[0]))
         step = 1 if over_frequency else -1  # frequency along x and fixed amplitudes, or the other way round

@@ -1,6 +1,7 @@
 """Figure of predictions over frequency and amplitude, as in Figs. 7 to 9 of the paper, with measured points."""
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 import pandas as pd
@@ -41,6 +42,7 @@ def prediction_figure(
 ) -> style.Chart:
     """Figure of predicted stiffness magnitude and loss factor over frequency and over amplitude, with measured points.
 
+    Lines are predicted on a finer grid, which contains the frequencies and amplitudes of the prediction.
     Up to six amplitudes and four frequencies are drawn, preferably levels that were measured. Sweeps in which neither
     amplitude nor frequency is fixed have a separate row of panels, with the model at their points.
 
@@ -55,16 +57,20 @@ def prediction_figure(
     Returns:
         Figure with one or two rows of panels, and one more for each group of such sweeps.
     """
-    place, fine = prediction.direction, refine_prediction(result, prediction, temperature)
-    rig = None
-    if rig_effects(result) and not prediction.over:
-        rig = refine_prediction(result, prediction, temperature, rig=True)
+    place, fine, rig = prediction.direction, prediction, None
+    frequencies, amplitudes = np.unique(prediction.frequency), np.unique(prediction.amplitude)
+    if not prediction.over:  # which takes too long to repeat
+        fine_axes = [
+            values if values.size < 2 else np.union1d(values, np.geomspace(values[0], values[-1], _FINE))
+            for values in (frequencies, amplitudes)
+        ]
+        refined = partial(predict, result, place, *fine_axes, temperature=temperature, preload=prediction.preload)
+        fine, rig = refined(), refined(rig=True) if rig_effects(result) else None
     of_place = None if table is None else rows_at_preload(table[table["direction"] == str(place)], prediction)
     groups = [] if of_place is None or of_place.empty else sweep_groups(of_place, result)
     free = [group.thinned() for group in groups if group.palette == "loop" and np.isnan(group.curves[0].level)]
     rows = [curve.rows for group in groups for curve in group.curves if not np.isnan(curve.level)]
     points = pd.concat(rows) if rows else None
-    frequencies, amplitudes = np.unique(prediction.frequency), np.unique(prediction.amplitude)
     panels: list[tuple[Axis, Array]] = []
     if frequencies.size > 1 or amplitudes.size == 1:
         panels.append(("frequency", amplitudes))
@@ -123,30 +129,6 @@ def static_figure(curves: Sequence[StaticCurve], title: str) -> style.Chart:
     return figure.explain(
         f"Thin lines: loading and unloading at {curve.rate_text}; thick: their mean, and its slope; shaded: 95 % band."
     )
-
-
-def refine_prediction(
-    result: Result, prediction: Prediction, temperature: float | None = None, *, rig: bool = False
-) -> Prediction:
-    """Repeat a prediction on a finer grid of frequencies and amplitudes, for smooth lines.
-
-    Args:
-        result: fitted or given model.
-        prediction: prediction for one direction or specimen.
-        temperature: temperature of the prediction [K]; None for the reference temperature.
-        rig: True to include the effects of the rig, as in the tests.
-
-    Returns:
-        Prediction on the finer grid, which contains the given frequencies and amplitudes. A prediction of a vibration
-        on a large motion takes too long to repeat, and is returned unchanged.
-    """
-    if prediction.over:
-        return prediction
-    grid = [
-        values if values.size < 2 else np.union1d(values, np.geomspace(values[0], values[-1], _FINE))
-        for values in map(np.unique, (prediction.frequency, prediction.amplitude))
-    ]
-    return predict(result, prediction.direction, *grid, rig=rig, temperature=temperature, preload=prediction.preload)
 
 
 def draw_prediction(

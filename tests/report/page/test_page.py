@@ -60,7 +60,11 @@ def test_the_first_block_is_what_a_customer_reads(results):
         assert row.startswith(f"{dynamic:.4g} N/mm")
         for number in (f"{loss.imag / loss.real:.3g} ", f"{dynamic / static:.2f} ±"):
             assert number in row
-        assert float(row.partition(f" N/mm at {rate:.3g} mm/min")[0].split()[-1]) == pytest.approx(static, rel=5e-4)
+        stated = re.search(rf"([\d.]+) N/mm ([\d.]+) to ([\d.]+) at {rate:.3g} mm/min", row)
+        value, low, high = map(float, stated.groups())
+        assert value == pytest.approx(static, rel=5e-4)
+        assert 0.0 < high - low < 0.1 * static
+        assert low < static < high
     for words in (
         *("95 % of 144 held-out points", "fitted to tests in this direction", "Verdict: consistent"),
         *("predicted from axial tests; the measured sweep agrees within its noise",),

@@ -12,7 +12,7 @@ from production import COUNT, LOSSY, SOFT
 from reading_html import LARGEST, loads, parsed
 
 from bushfit import units
-from bushfit.report.compared import ComparisonDocument
+from bushfit.report.compared import read_comparison
 from bushfit.report.page import folder_pages
 from bushfit.report.page.comparison import comparison_page
 from bushfit.report.results import Formats, encode_all
@@ -25,7 +25,7 @@ SLOW = pytest.mark.slow
 
 
 def page_of(document: Any) -> str:
-    return comparison_page(ComparisonDocument.from_document(document))
+    return comparison_page(read_comparison(document))
 
 
 def document_of(compared: Path, name: str) -> Any:
