@@ -86,7 +86,9 @@ def check_effect(name: str, *, add: AddEffect | None = None, seed: int = 2024060
         _check_harmonic(model, effect, direction, frequency, amplitude)
     _check_arrays(model, direction, amplitude, rng)
     copy = from_document(json.loads(json.dumps(to_document(Result(model))))).model
-    assert (copy.values, {*copy.effects}) == (model.values, {*model.effects}), f"{name}: a model file loses the effect"
+    assert (copy.values, {*copy.effects}) == (model.values, {*model.effects}), (
+        f"{name}: the effect or its values differ after writing and reading a model file"
+    )
 
 
 def _check_record(effect: Effect) -> None:

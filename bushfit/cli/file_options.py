@@ -18,7 +18,7 @@ _OF_TESTS = {
     "amplitude COUNTING": "Meaning of the amplitudes in the file: zero-to-peak, peak-to-peak or rms [from the header].",
     "at_amplitude SIZE": 'Amplitude of the whole file, such as "0.1 mm" [from a column or the file name].',
     "at_frequency FREQUENCY": 'Frequency of the whole file, such as "10 Hz" [from a column or the file name].',
-    "temperature TEMP": 'Temperature of the test, such as "23 degC"; selects its rows in a file with several.',
+    "temperature TEMP": 'Temperature of the test, such as "23 degC". If the file has several, it selects the rows.',
     "preload LOAD": 'Static preload of the test, such as "500 N axial" or "none"; shown in the report.',
     **dict.fromkeys(("rate SPEED", "frequency FREQUENCY", "waveform WAVE")),
     "sampling_rate FREQUENCY": 'For a loop without time: speed ("10 mm/min"), frequency ("0.1 Hz") with waveform '
@@ -27,7 +27,7 @@ _OF_TESTS = {
     **dict.fromkeys(("area AREA", "thickness LENGTH")),
     "elements N": 'For a specimen of N rubber blocks in shear [1]: sheared area ("772 mm^2") and thickness ("6 mm") '
     "of one block.",
-    "specimen_number NUMBER": "Serial number of the part; selects its rows in a file with several.",
+    "specimen_number NUMBER": "Serial number of the part. If the file has several parts, it selects the rows.",
 }
 #: Options for the file format: campaign key with its placeholder.
 _AS_WRITTEN = ("encoding NAME", "delimiter WORD", "decimal MARK", "thousands MARK", "header_line LINE", "sheet NAME")
@@ -59,7 +59,7 @@ def metadata_options(kind: Literal["tests", "histories", "displacements"] = "tes
             tests; both add the argument `files`. "displacements" for one displacement history.
     """
     unit, header = ("axial=mm", "radial=Sy") if kind == "displacements" else ("force=kN", "force=Fz")
-    words = f'Header of a column, such as "{header}"; if ROLE does not exist, all roles are printed.'
+    words = f'Header of a column, such as "{header}". An unknown ROLE prints all roles.'
     columns = (
         option("--unit units ROLE=UNIT", f'Unit of a column, such as "{unit}".', multiple=True),
         option("--column columns ROLE=HEADER", words, multiple=True),

@@ -80,7 +80,7 @@ def dynamic(
     direction_option("fit", "axial, and all specimens"),
     option(
         "--effect effects NAME",
-        "Add this effect to the model, such as inertia. If no effect has this name, all names are printed.",
+        "Add this effect to the model, such as inertia. An unknown name prints all names.",
         multiple=True,
     ),
     flag("--profile", "Compute additional 95 % intervals by profile likelihood; takes some seconds."),

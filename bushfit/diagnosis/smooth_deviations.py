@@ -25,7 +25,7 @@ from bushfit.geometry import stiffness_per_modulus
 from bushfit.reading.measurement import SAME_TEMPERATURE
 from bushfit.reduction.harmonics import basis
 
-#: Name of the compound's own deviation among explanations without a name.
+#: Name of the compound's own deviation among unnamed explanations.
 COMPOUND = "compound"
 #: Number of patterns of the compound's deviation: with three to five levels more improve nothing.
 _COMPOUND_PATTERNS = 12

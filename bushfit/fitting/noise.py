@@ -158,7 +158,7 @@ def sweep_noise(sweeps: Sequence[Sweep], rig: RigSettings = UNSTATED) -> SweepNo
             if np.any(error > largest):
                 excesses[name] = (
                     f"repeats differ as a whole by an error of {format_class_errors(_pair(error))}, more than a rig of "
-                    f"this class causes ({describe_class(rig)}). Measure again, or state the class under [rig]"
+                    f"this class causes, {describe_class(rig)}. Measure again, or state the class under [rig]"
                 )
         errors = _pair(_shared(repeated, rig)), "repeats", freedom, scatter_freedom
         return SweepNoise(random, *errors, slopes, class_errors(rig, (0.0, 0.0)), excess_warnings=excesses)

@@ -96,8 +96,8 @@ def other_line(found: FitResult) -> tuple[Alternative, ...]:
         chi-square exceeds that of `found` by less than 3.84 (95 % of chance); else nothing.
 
     Notes:
-        By symmetry friction is the same for both senses of a preload, but this leaves open how it grows: a line over
-        the preload and one over its square are the slow and the fast course between two preloads.
+        By symmetry, friction is the same for both senses of a preload, but two preloads do not determine how friction
+        grows between them. A line over the preload and a line over its square are the two extreme cases.
     """
     other = dict(zip((*_ODD[1:], *_EVEN[1:]), (*_EVEN[1:], *_ODD[1:]), strict=True))
     free = {name for name in found.names if name in other}

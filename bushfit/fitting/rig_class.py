@@ -33,5 +33,5 @@ def format_class_errors(error: tuple[float, float]) -> str:
 def describe_class(rig: RigSettings) -> str:
     """Format the gain and phase error of a rig as text, and state which of them is assumed."""
     unstated = [name for name, error in zip(("gain", "phase"), rig.stiffness_errors, strict=True) if error is None]
-    whose = f"{' and '.join(unstated)} assumed" if unstated else "as [rig] states"
-    return f"{format_class_errors(class_errors(rig))}, {whose}"
+    origin = f"{' and '.join(unstated)} assumed" if unstated else "stated in [rig]"
+    return f"{format_class_errors(class_errors(rig))} ({'both assumed' if len(unstated) > 1 else origin})"

@@ -70,8 +70,8 @@ def keys_from_labels(
         is_sweep: True for a sweep, whose frequency and amplitude have to be known.
 
     Returns:
-        The values by campaign key; sentences on their origin by the origin ("from the name"); and False if a label
-        states an amplitude but not whether the amplitude is zero-to-peak or peak-to-peak.
+        The values by campaign key; for each origin (such as "from the name"), a sentence that lists the values from it;
+        and False if a label states an amplitude but not whether the amplitude is zero-to-peak or peak-to-peak.
 
     Raises:
         MeasurementError: a sweep without an amplitude or a frequency.

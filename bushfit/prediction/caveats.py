@@ -156,8 +156,8 @@ def unfitted_warnings(result: Result, direction: Place) -> Iterator[str]:
     if not (of_bushing or direction.axis in (Direction.RADIAL, Direction.TORSION)):
         if corrected.isdisjoint(direction.labels):
             yield (
-                f"{direction}: not fitted, predicted from the {tests} tests. The band excludes the difference between "
-                "two bodies of one compound and the error of their dimensions"
+                f"{direction}: not fitted, predicted from the {tests} tests. The band excludes errors of the "
+                "dimensions, and differences between two bodies of one compound"
             )
         return
     radially = direction.axis is Direction.RADIAL or (Direction.AXIAL not in axes and Direction.RADIAL in axes)

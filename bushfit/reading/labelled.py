@@ -80,7 +80,8 @@ def _distinct_cells(
     """Find the distinct cells (texts or numbers) of columns in a block of rows.
 
     Yields:
-        For each column, the index among its distinct cells of each of the n rows of data, (n,), and these cells.
+        For each column, its distinct cells as the second item; as the first, the index of each row's cell among them,
+        (n,) for n rows of data.
     """
     import pandas as pd
 
