@@ -56,6 +56,10 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
     Notes:
         Solution y of T dy/dt + y = T dF/dt, T = 1/(2 pi corner), in sweeps, F in loops. Exact for a steady cycle; from
         rest, F is linear between samples.
+
+    >>> held = History.sampled(np.full(4, 1e-4), 0.1)
+    >>> force({"corner": 1.0}, lambda history: 1e6 * history.value, held, sweep).round(1)
+    array([74.2, 39.6, 21.1, 11.3])
     """
     felt = below(history)
     if setting.kind != "sweep":

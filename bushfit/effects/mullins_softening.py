@@ -40,8 +40,8 @@ def stress(p: Values, history: History) -> Array:
         A single steady cycle has no such stress.
 
     >>> strain = History.steady(np.full(4, 0.01), 1.0, cycles=2)
-    >>> stress({"mu": 1e6, "share": 0.05, "cycles": 1.0}, strain).round()
-    array([1000.,  607.,  368.,  223.])
+    >>> stress({"mu": 1e6, "share": 0.05, "cycles": 2.0}, strain).round()
+    array([1000.,  779.,  607.,  472.])
     """
     if history.periodic and history.cycles == 1:
         return np.zeros(history.value.shape)

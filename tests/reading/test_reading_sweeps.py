@@ -131,8 +131,8 @@ BAD_SWEEPS: list[tuple[str, dict[str, Any], list[str]]] = [
     (SWEEP, {"at_frequency": 5.0}, ["line 3", "the frequency in the file differs", "5 Hz", "at_frequency"]),
     (
         at_temperatures(-10.0, 18.4),
-        {"temperature": 313.15},
-        ["near the stated temperature", "-10.0, 18.4 degC", "2 K of 40 degC", 'temperature = "18.4 degC"'],
+        {"temperature": 273.15},
+        ["near the stated temperature", "-10.0, 18.4 degC", "2 K of 0 degC", 'temperature = "-10.0 degC"'],
     ),
     (SWEEP, {"direction": DMA}, ["line 1", "test of displacement and force or stiffness", 'kind = "shear"']),
     (COUPON.replace("_dyn_pct", ""), {"direction": DMA}, ["line 1", "the amplitude has no unit", 'write "strain [%]"']),
