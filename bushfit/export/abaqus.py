@@ -53,9 +53,7 @@ def export(request: ExportRequest) -> Exported:
     omissions = tuple(table_omissions(request, _FORM))
     series = prony_series(request) if request.time_domain else []
     if has_material := LONG_TERM in request.result.model.values:
-        omissions += (
-            "compound: strain is uniform in a material, so the amplitude of each element is that of the table",
-        )
+        omissions += ("compound: the material has one strain amplitude everywhere, which its table states",)
     else:
         omissions += ("compound: no elastic branch, so no long-term modulus, and no material",)
     usage = "behaviors are for CONN3D2 of type BUSHING; they act in *STEADY STATE DYNAMICS, DIRECT"

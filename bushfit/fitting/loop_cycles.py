@@ -104,7 +104,7 @@ def _steady_part(loop: Loop, time: Array, motion: Array) -> tuple[Loop, str | No
         whole = _cut(loop, first, last)
         part, note = _steady_part(whole, *_thinned(whole))
         sentence = f"rows are missing; of {time[-1] - time[0]:.3g} s only {first:.4g} to {last:.4g} s are used"
-        return part, sentence if note is None else f"{sentence}; of this part, {note}"
+        return part, sentence if note is None else f"{sentence}; in this part, {note}"
     spans = steady_spans(loop, time, motion)
     if not spans:
         return loop, None
