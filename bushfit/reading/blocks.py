@@ -267,38 +267,43 @@ def _with_plain_cells(source: RowSource, layout: Layout) -> tuple[RowSource, Lay
         return source, layout
     lines = [(line.number, list(cells_of(line, layout.delimiter))) for line in source.lines(layout.lines_before_data)]
     for index in reversed(range(len(headers))):
-        name, unit = units.split_header(headers[index])
-        if unit_of[index]:
-            row_of_units[index] = row_of_units[index] or unit_of[index]
+        if unit := unit_of[index]:
+            row_of_units[index] = row_of_units[index] or unit
         elif is_complex[index]:
-            suffix = f" [{unit}]" if unit else ""
+            name, unit_text = units.split_header(headers[index])
+            suffix = f" [{unit_text}]" if unit_text else ""
             headers[index : index + 1] = [f"{name} real{suffix}", f"{name} imaginary{suffix}"]
             row_of_units[index : index + 1] = [row_of_units[index]] * 2
-        for _, cells in lines if unit_of[index] or is_complex[index] else ():
+        else:
+            continue
+        for _, cells in lines:
             text = str(cells[index]) if index < len(cells) else ""
-            if unit_of[index]:
-                cells[index : index + 1] = [_in_unit(text, unit_of[index])]
-            elif match := _COMPLEX.fullmatch(text):
-                cells[index : index + 1] = [match[1], re.sub(r"\s|^\+", "", match[2])]
-            else:
-                cells.insert(index + 1, "")
+            cells[index : index + 1] = [_in_unit(text, unit)] if unit else _complex_parts(text)
     layout = replace(layout, headers=tuple(headers), units=tuple(row_of_units))
     numbers, content = zip(*lines, strict=True)
     return Sheet(source.sheet or "", content, numbers=numbers, above=source.head()), layout
 
 
+def _complex_parts(text: str) -> list[str | float]:
+    """Real and imaginary part of a complex number; any other text, and an empty cell."""
+    match = _COMPLEX.fullmatch(text)
+    return [match[1], re.sub(r"\s|^\+", "", match[2])] if match else [text, ""]
+
+
 def _common_unit(texts: Sequence[str]) -> str:
     """Unit behind the number in each of several cells, such as "mm" of "0.5 mm"; "" without such a unit."""
     found = list(dict.fromkeys(match["unit"] if (match := _WITH_UNIT.fullmatch(text)) else "?" for text in texts))
-    return found[0] if found and all(units.is_compatible(unit, found[0]) for unit in found) else ""
+    is_temperature = bool(found) and all(map(units.kelvin_scale, found)) and len(found) == 1
+    is_unit = bool(found) and all(units.is_compatible(unit, found[0]) for unit in found)
+    return found[0] if is_temperature or is_unit else ""
 
 
 def _in_unit(text: str, unit: str) -> str | float:
     """Number of a cell such as "500 um" in a unit; the text itself if it states no compatible unit."""
     match = _WITH_UNIT.fullmatch(text)
+    if match and match["unit"] == unit:
+        return match["number"]
     if match is None or not units.is_compatible(match["unit"], unit):
         return text
-    if match["unit"] == unit:
-        return match["number"]
     ratio = units.si_factor(match["unit"], match["unit"]) / units.si_factor(unit, unit)
     return float(f"{plainest_value(match['number']) * ratio:.12g}")

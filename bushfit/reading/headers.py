@@ -50,11 +50,14 @@ ALL_COLUMNS = {
     role: [name for names in _OF_TESTS for name in names.get(role, ())]
     for role in dict.fromkeys(role for names in _OF_TESTS for role in names)
 }
+#: Roles with a common property, in a fixed order, by property (see words.toml).
+ROLE_SETS = {kind: dict.fromkeys(roles).keys() for kind, roles in WORDS["role_sets"].items()}
 #: Names of columns that assign rows to tests, by what they contain: direction, specimen_number or run.
 ROW_COLUMNS = {
     **WORDS["rows"],
     "specimen_number": WORDS["above"]["specimen_number"],
     "run": [*SWEEP_COLUMNS["repeat"], "block"],
+    "condition": [*SWEEP_COLUMNS["preload"], *SWEEP_COLUMNS["temperature"]],
 }
 #: Convention by which an amplitude is stated.
 AmplitudeConvention = Literal["zero-to-peak", "peak-to-peak", "rms"]
@@ -104,16 +107,12 @@ _MEANS = re.compile(
 _FOOTNOTES = str.maketrans("", "", "\u00b9\u00b2\u00b3\u2070\u2074\u2075\u2076\u2077\u2078\u2079\u2020\u2021")
 #: Units with which the symbol f cannot mean a role, by role.
 _UNITS_NOT_F = {"force": ("Hz",), "frequency": ("N", "N m")}
-#: Roles that a column without a unit does not have, whatever its name.
-_NEEDING_UNITS = ("damping_coefficient", "force_amplitude", "energy", "preload")
 #: Units with which a short or ambiguous name means a role, by name and role.
 _UNITS_OF = {
     (name, role): si
     for role, entries in WORDS["units_of"].items()
     for name, *si in (entry.split() for entry in entries)
 }
-#: Roles of the stiffness and its loss, of which a column may contain the mean of several parts.
-_OF_MEANS = frozenset(("stiffness", "storage_stiffness", "loss_stiffness", "loss_factor", "phase"))
 #: Names of an amplitude that imply peak-to-peak.
 PEAK_TO_PEAK_NAMES = frozenset(WORDS["counting"]["peak_to_peak"])
 #: Parts of the patterns of conventions: ends of words, and the end of a unit to which one may be joined ("mmpp").
@@ -266,7 +265,7 @@ class Vocabulary:
             for word in (
                 bare,
                 without_asides,
-                *([without_mean] if _OF_MEANS.intersection(self._roles.get(without_mean, ())) else []),
+                *([without_mean] if ROLE_SETS["of_means"] & self._roles.get(without_mean, ()) else []),
                 *amplitudes,
                 *self._names_with_symbol(name, unit),
             ):
@@ -304,7 +303,7 @@ def fits(word: str, role: str, unit: str | None) -> bool:
     Returns:
         False if the unit excludes the role.
     """
-    if unit == "" and (role in _NEEDING_UNITS or word == "k"):
+    if unit == "" and (role in ROLE_SETS["needing_units"] or word == "k"):
         return False
     if word == "t" and role == "temperature" and unit is not None:
         return bool(units.kelvin_scale(unit))  # else a time, or another quantity
@@ -364,6 +363,11 @@ def plain(name: str) -> str:
     return letters.replace("ae", "a").replace("oe", "o").replace("ue", "u")
 
 
+def plain_name(header: str) -> str:
+    """Name in a column header, in plain letters (see `plain`): "force" of "Force p-p [N]"."""
+    return plain(units.split_header(split_convention(header)[0])[0])
+
+
 def split_unit(header: str) -> tuple[str, str | None, AmplitudeConvention | None]:
     """Return name, unit and amplitude convention of a header of unknown meaning; None if not in the header."""
     text, convention = split_convention(header)
@@ -382,6 +386,7 @@ def _splits(text: str) -> Iterator[tuple[str, str | None, bool]]:
     if unit is None:
         for end in reversed(list(_NAME_END.finditer(name))):
             text = _PER_OF_NEWTON.sub("N/", name[end.end() :].replace("_", " "))
+            text = "N" if text == "n" and end.start() > 1 else text  # "force_n" in names without capitals
             if _PER.search(name[: end.start()]):
                 continue  # a part of a unit such as N_per_mm
             if not (text.startswith("dyn") or units.is_number(text)):  # dynamic, and no dyne; the first of several

@@ -118,17 +118,20 @@ def find_labels(table: Table) -> Mapping[str, tuple[int, Sequence[str]]]:
     labels: dict[str, tuple[int, Sequence[str]]] = {}
     for index, header in enumerate(table.headers):
         heading = _LABELS.heading(header) if header else None
-        if heading is None or heading.role in labels or (header == "block" and "displacement" not in table.roles):
+        role, is_loop = heading.role if heading else "", {"time", "displacement"} <= set(table.roles)
+        if role == "condition":  # of a loop: a run if the time begins anew
+            role = "run" if is_loop else ""
+        if role in ("", *labels) or (header == "block" and "displacement" not in table.roles):
             continue
         if _may_distinguish_tests(table, index):
             (texts,) = column_texts(table, index)
-            if heading.role == "direction":
+            if role == "direction":
                 directions = [named_direction([text], short=True) for text in texts.distinct]
                 if not any(directions):
                     continue
                 named = [str(direction or text) for direction, text in zip(directions, texts.distinct, strict=True)]
                 texts = ColumnTexts(named, texts.codes)
-            labels[heading.role] = (index, texts.per_row())
+            labels[role] = (index, texts.per_row())
     return labels
 
 

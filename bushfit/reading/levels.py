@@ -6,12 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bushfit.geometry import Motion
+from bushfit.geometry import Direction, Motion
 from bushfit.reading.headers import Column
 from bushfit.reading.labelled import column_texts
 from bushfit.reading.measurement import SAME_TEMPERATURE, Floats
 from bushfit.reading.numerals import Numerals
 from bushfit.reading.runs import group_rows
+from bushfit.reading.si_columns import si_column
 from bushfit.reading.table import Table
 from bushfit.units import CELSIUS, is_compatible, kelvin_scale, number
 
@@ -61,19 +62,24 @@ def read_condition(table: Table, role: str, motion: Motion) -> Condition | None:
 
     Returns:
         The values; None without a column, without a fitting unit, or with a cell that is not a number.
+
+    Raises:
+        UnitError: several temperatures without a unit.
     """
     if (column := table.roles.get(role)) is None:
         return None
     kelvin, units = kelvin_scale(column.unit or ""), (motion.displacement_unit, motion.force_unit)
-    if kelvin is None and (role == "temperature" or not any(is_compatible(column.unit or "?", si) for si in units)):
+    if role == "preload" and not any(is_compatible(column.unit or "?", si) for si in units):
         return None
     (texts,) = column_texts(table, column.index)
     notations = (table.numerals, Numerals())  # the second for numbers of a workbook
     found = ([way.value(text) for way in notations] for text in texts.distinct)
     distinct = [next((value for value in pair if value is not None), np.nan) for pair in found]
     values = np.array(distinct, dtype=float)[texts.codes]
-    if np.isnan(values).any():
+    if np.isnan(values).any() or (role == "temperature" and not kelvin and np.ptp(values) <= ONE_TEST):
         return None
+    if role == "temperature" and not kelvin:
+        si_column(table, role, Direction.AXIAL)  # raises the error, whatever the direction
     if kelvin:
         return Condition(column, "degC", kelvin[0] * values + kelvin[1] - CELSIUS, SAME_TEMPERATURE)
     return Condition(column, column.unit or "", values, _PRELOAD_STEP * float(np.abs(values).max(initial=0.0)))

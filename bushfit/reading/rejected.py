@@ -10,7 +10,7 @@ import numpy as np
 
 from bushfit import units
 from bushfit.errors import MeasurementError, UnitError
-from bushfit.reading.headers import WORDS, Column, Vocabulary, parse_unit, plain, split_unit
+from bushfit.reading.headers import ROLE_SETS, WORDS, Column, Vocabulary, parse_unit, plain, split_unit
 from bushfit.reading.layout import is_row, is_summary_row
 from bushfit.reading.measurement import Floats
 from bushfit.reading.numerals import is_like_number
@@ -33,13 +33,6 @@ _MARK_RATIO = 3.0
 
 #: Roles of a stiffness, of which zero is no measurement.
 _SIZES = ("stiffness", "storage_stiffness")
-#: Roles whose values must be positive.
-POSITIVE = (
-    *("frequency", "amplitude", "amplitude_reached", "stiffness", "storage_stiffness", "force_amplitude"),
-    *("compliance", "storage_compliance", "relative_error"),
-    *("base_acceleration", "mass_acceleration", "transmissibility"),
-)
-
 #: Line number and cells of a row that is not data, and the reason, see `row_fault`.
 FaultyRow = tuple[int, Sequence[str | float], str]
 
@@ -167,13 +160,13 @@ def check_positive(table: Table, wanted: Mapping[str, Column], values: Mapping[s
 
     Args:
         table: table of the columns.
-        wanted: columns by role; those of `POSITIVE` are checked.
+        wanted: columns by role; positive ones are checked.
         values: values in SI by role, (n,) each.
 
     Raises:
         MeasurementError: a value is not positive or too small.
     """
-    for role in POSITIVE:
+    for role in ROLE_SETS["positive"]:
         if role in values:
             problem = f"the {role.replace('_', ' ')} is not positive"
             hint = "correct this cell, or delete its row from the file"

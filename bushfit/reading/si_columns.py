@@ -9,15 +9,30 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
+import numpy as np
+from numpy.typing import NDArray
+
 from bushfit import units
 from bushfit.errors import UnitError, error_location
 from bushfit.geometry import STRAINING, TRANSLATION, Place, strain_factor_of_files
-from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS, Column, Vocabulary, is_angular, parse_unit, split_unit
+from bushfit.reading.headers import (
+    LOOP_COLUMNS,
+    SWEEP_COLUMNS,
+    Column,
+    Heading,
+    Vocabulary,
+    is_angular,
+    parse_unit,
+    split_unit,
+)
+from bushfit.reading.numerals import plainest_value
 from bushfit.reading.roles import OF_MOTION, of_motion, si_unit
 
 if TYPE_CHECKING:
     from bushfit.reading.table import Table
 
+#: Number above zero of a stated multiple of a unit, such as 200 N for the force of 1 V.
+_MULTIPLE = re.compile(r"^(?=[\d.]*[1-9])\d+\.?\d*(?=\s+[^\W\d_])")
 #: Quantity in a line above a table: "1 V = 200 N", "Crosshead speed: 10 mm/min".
 _QUANTITY = re.compile(r"[=:]\s*(\d+(?:[.,]\d+)?)\s*([^\s\d,;]+(?:\s*/\s*[^\s\d,;]+)?)")
 
@@ -155,3 +170,38 @@ def quantity_above(table: Table, unit: str) -> str | None:
     matches = (match for match in matches if units.is_compatible(match[2], unit))
     texts = dict.fromkeys(f"{match[1].replace(',', '.')} {match[2]}" for match in matches)
     return next(iter(texts)) if len(texts) == 1 else None
+
+
+def column_of(table: Table, heading: Heading, index: int, stated_unit: str | None = None) -> Column:
+    """Make the column of a header, with the unit that the user states, or else the unit in the header or units row.
+
+    Args:
+        table: header and rows of the table.
+        heading: meaning of the header: role (quantity, such as "force"), unit and convention.
+        index: index of the column.
+        stated_unit: unit that the user states; None without one.
+    """
+    multiple = _MULTIPLE.sub(r"x \g<0>", stated_unit or "")
+    from_user, in_row = (parse_unit(text) for text in (multiple, table.layout.units[index]))
+    in_header = parse_unit(heading.unit or "")
+    texts = [from_user[0]] if stated_unit else sorted({in_header[0], in_row[0]} - {""})
+    conventions = {from_user[1] or part for part in (heading.convention, in_header[1], in_row[1], from_user[1]) if part}
+    logarithm = from_user[2] or in_row[2] or in_header[2] or heading.logarithm
+    unit, convention = next(iter(texts), None), next(iter(conventions), None)
+    column = Column(heading.role, unit, convention, logarithm, header=table.headers[index], index=index)
+    if len(texts) > 1 or len(conventions) > 1:
+        raise UnitError(
+            f"two units for the {heading.role.replace('_', ' ')}",
+            file=table.file,
+            place=table.place(table.layout.header_line, column),
+            found=" and ".join(texts if len(texts) > 1 else sorted(conventions)),
+            expected="one unit, from the header or the units row",
+            hint=f'state the right one in the campaign: units = {{ {heading.role} = "{texts[0]}" }}',
+        )
+    return column
+
+
+def first_numbers(table: Table, columns: Sequence[Column]) -> NDArray[np.float64]:
+    """Return the numbers in the first rows of columns, (rows, columns), in file units; no rows with other cells."""
+    rows = [[plainest_value(str(row[column.index])) for column in columns] for row in table.first_rows]
+    return np.empty((0, len(columns))) if np.isnan(rows).any() else np.array(rows)

@@ -164,6 +164,10 @@ class Sheet:
     hidden: Sequence[int] = ()
     is_visible: bool = True
 
+    def may_contain(self, _sign: str, _layout: Layout) -> bool:
+        """Return True: cells of a sheet may contain any sign."""
+        return True
+
     def head(self) -> list[Line]:
         """Return the lines above the table, and the first non-empty rows, which can contain the header."""
         return [*self.above, *islice(self.lines(0), MOST_HEAD_LINES)]

@@ -22,8 +22,7 @@ from bushfit.reading.labelled import find_labels
 from bushfit.reading.layout import Layout, Line, is_comment, is_row, is_summary_row
 from bushfit.reading.measurement import Floats
 from bushfit.reading.names import Labels, is_remark, labels_above, labels_in_text
-from bushfit.reading.notation import find_first_decimal, find_numerals
-from bushfit.reading.numerals import ALL_NUMERALS, Numerals, is_like_number
+from bushfit.reading.numerals import ALL_NUMERALS, Numerals, find_first_decimal, find_numerals, is_like_number
 from bushfit.reading.parts import OpenedFile
 from bushfit.reading.rejected import (
     FaultyRow,

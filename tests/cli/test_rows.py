@@ -91,6 +91,7 @@ def test_parts_are_a_batch(typed, points, tmp_path):
     [
         ("T [°C]", (-30, 23, 80), [f'temperature = "{level}.0 degC"' for level in (-30, 23, 80)], "temperatures"),
         ("Vorlast [N]", (0, 500, 1000), [f'preload = "{level} N"' for level in (0, 500, 1000)], "preloads"),
+        ("Temperature", ("23 °C", "80 °C"), ['temperature = "23.0 degC"', 'temperature = "80.0 degC"'], "temperatures"),
         ("Static deflection (mm)", (1, 2, 4), [f'preload = "{level} mm"' for level in (1, 2, 4)], "preloads"),
     ],
 )
