@@ -68,7 +68,7 @@ def explanation_odds(finding: Finding) -> Odds:
         *parts, last = (*parts, *composition.nameless)
         sentences.append(", and ".join(filter(None, (", ".join(parts), last))))
         is_rival = finding.verdict == "ambiguous" or composition is not finding.reported[0]
-        fit = composition.best.state.fit if is_rival and composition.best.refitted else None
+        fit = composition.best.state.plain if is_rival and composition.best.refitted else None
         fits.append((fit.model, misfit_covariance(fit)) if fit else None)
     pairs = tuple(zip(sentences, (composition.probability for composition in compositions), strict=True))
     labels = tuple(composition.label for composition in compositions)

@@ -178,8 +178,8 @@ def result_of(
 
 def misfit_covariance(fit: FitResult) -> Covariance:
     """Covariance of the parameters that are not at a bound, larger by the reduced chi-square of a fit with a misfit."""
-    matrix = np.linalg.pinv(fit.jacobian @ fit.jacobian.T, rcond=1e-12, hermitian=True)
+    free = fit.jacobian[fit.moving]
+    matrix = np.linalg.pinv(free @ free.T, rcond=1e-12, hermitian=True)
     matrix *= max(fit.chi_square / max(fit.residual.size - len(matrix), 1), 1.0)  # what the fit misses
-    slopes = fit.coordinates.slopes(fit.model.values)
-    covariance = Covariance(tuple(fit.names), matrix * np.outer(slopes, slopes))
-    return covariance.restricted([name for name in fit.model.values if name not in fit.at_bound])
+    slopes = fit.coordinates.slopes(fit.model.values)[fit.moving]
+    return Covariance(tuple(fit.names[i] for i in fit.moving), matrix * np.outer(slopes, slopes))

@@ -132,9 +132,10 @@ class Odds:
 
         Returns:
             The result with, for each other explanation, the squared difference of its parameters times its probability
-            added to the covariance; and with the explanations as alternatives if the tests cannot distinguish them. A
-            fit with a parameter at its bound is left out of the covariance: without mu, coefficients over mu are
-            meaningless.
+            added to the covariance; and with the explanations as alternatives if the tests cannot distinguish them.
+
+        Notes: parameters are not comparable, and add nothing, if the other fit has one of them at its bound (without
+        mu, coefficients over mu are meaningless), or if an effect replaces one of the result's.
         """
         cov, current = result.covariance, result.model.values
         matrix, alternatives = cov.matrix.copy(), list[Alternative]()
@@ -143,7 +144,8 @@ class Odds:
                 continue
             model, covariance = fit
             difference = np.array([model.values.get(name, current[name]) - current[name] for name in cov.names])
-            if {*cov.names} & {*model.values} <= {*covariance.names}:
+            other_law = any(effect.replaces for effect in model.records if effect.name not in result.model.effects)
+            if not other_law and {*cov.names} & {*model.values} <= {*covariance.names}:
                 matrix += (1.0 - self.nothing) * probability * np.outer(difference, difference)
             if self.are_alternatives:
                 alternatives.append(Alternative(model, (1.0 - self.nothing) * probability, covariance))

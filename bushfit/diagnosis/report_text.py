@@ -340,7 +340,7 @@ class DiagnosisWriter:
             after,
             bounds,
             {*base.model.effects} - {*search.settings.unresolved},
-            lacking=not (self.first and self.first.best.claim),
+            lacking=self.finding.verdict == "ambiguous" or not (self.first and self.first.best.claim),
             corrected=gap.fitted if gap else None,
             rig=search.data.campaign.rig,
             fixed=closing.known,
