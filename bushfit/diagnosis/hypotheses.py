@@ -17,7 +17,7 @@ from bushfit.diagnosis.priors import LEVELS
 from bushfit.diagnosis.propose import Proposal, proposals
 from bushfit.diagnosis.recorded_tests import RecordedTests
 from bushfit.diagnosis.rig_errors import in_scatter_units
-from bushfit.diagnosis.smooth_deviations import COMPOUND, compound
+from bushfit.diagnosis.smooth_deviations import COMPOUND, compound, fast_relaxation
 from bushfit.effects import get_effect, get_parameter, qualified_name
 from bushfit.effects.contract import Array
 from bushfit.fitting.problem import FitResult
@@ -227,15 +227,14 @@ class SearchState:
     def parameters(self) -> tuple[dict[str, float], Covariance]:
         """Posterior means [SI] and covariance of the parameters inside their ranges.
 
-        The covariance includes errors of the rig and all patterns of a deviation of the compound.
+        The covariance includes errors of the rig, all patterns of a deviation of the compound and its fast relaxation.
         """
         bare, values = self.bare, self.bare.model.values
-        deviation = compound(bare, MAXIMUM_NODES, fast=True)
-        linear = replace(self.linear, compound=deviation, chosen_cases=self._likely_cases)
+        linear = replace(self.linear, compound=compound(bare, MAXIMUM_NODES), chosen_cases=self._likely_cases)
         moves = np.isfinite([self.precision.get(name, 0.0) for name in bare.names])
         slopes, count = bare.coordinates.slopes(values)[moves], np.count_nonzero(moves)
         names = tuple(np.array(bare.names)[moves].tolist())
-        mean, covariance = linear.parameters()
+        mean, covariance = linear.parameters(fast_relaxation(bare))
         steps = dict(zip(names, slopes * mean[:count], strict=True))
         means = {name: float(np.clip(values[name] + x, *get_parameter(name).bounds)) for name, x in steps.items()}
         fitted = Covariance(names, covariance[:count, :count] * np.outer(slopes, slopes))

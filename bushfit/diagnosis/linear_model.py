@@ -54,6 +54,10 @@ class GroupEvidence:
         return float(np.logaddexp(self.log_evidence, self.with_compound.log_evidence))
 
 
+#: Largest prior size of an amount over a standard deviation that is nearly flat; it changes the amount by a permille.
+_SMALL = 0.03
+
+
 @dataclass(frozen=True, eq=False)
 class LinearModel(ProjectedColumns):
     """Linearised residuals of a fitted model, from which the evidence for each further explanation is computed.
@@ -183,21 +187,36 @@ class LinearModel(ProjectedColumns):
         freedom = max(self.residual.size - int(np.count_nonzero(self.precision == 0.0)), 1)
         return float(np.exp(base - _log_sum(base)) @ chdtrc(freedom, self.products.misfit))
 
-    def parameters(self) -> tuple[Array, Array]:
-        """Posterior of the k parameters (rows of the Jacobian) as changes from the fit, averaged over the noise cases.
+    def parameters(self, relaxation: Array) -> tuple[Array, Array]:
+        """Posterior of the changes of the k rows of the Jacobian from the fit, averaged over the noise cases.
+
+        Args:
+            relaxation: change of the n residuals by a relaxation that is faster than the tests, (n,). A compound that
+                deviates may have one, of any size in `priors.SIZES`.
 
         Returns:
             Mean, (k,), and covariance within and between the noise cases, (k, k).
+
+        Notes: the amount of the relaxation has a nearly flat prior first. A prior of variance v^2 then multiplies the
+        evidence by N(a; 0, c + v^2)/N(a; 0, c), where a is its estimate and c the variance of a (Savage and Dickey).
         """
-        group = Group(self.jacobian, np.eye(len(self.jacobian)), act_together=True)
+        rows = np.concatenate((self.jacobian, relaxation[None]))
+        group = Group(rows, np.eye(len(rows)), act_together=True)
         alone = replace(self, jacobian=self.jacobian[:0], precision=self.precision[:0], groups=(group,)).products
-        covariance = np.linalg.inv(alone.grams[0][:, 0] + np.diag(self.precision))
+        wide = np.append(self.precision, np.square(_SMALL / SIZES[-1]))
+        covariance = np.linalg.inv(alone.grams[0][:, 0] + np.diag(wide))
         shift = np.einsum("nij,nj->ni", covariance, alone.projections[0][:, 0])
+        amount, variance, along = shift[:, -1:], covariance[:, -1, -1:], covariance[:, :, -1]
+        total = variance + np.square(SIZES) * (self.deviations > 0.0)[:, None]  # (cases, sizes)
         base = np.where(self._is_plain | (self.deviations > 0.0), self.products.base, -np.inf)
-        share = np.exp(base - _log_sum(base))
-        mean = share @ shift
-        between = np.einsum("n,ni,nj->ij", share, shift - mean, shift - mean)
-        return -mean, np.einsum("n,nij->ij", share, covariance) + between
+        gain = 0.5 * (np.log(variance / total) + np.square(amount) * (1.0 / variance - 1.0 / total))
+        share = np.exp(base[:, None] + gain - _log_sum(base[:, None] + gain))
+        means = shift[:, None] - along[:, None] * (amount / total)[..., None]
+        mean = np.einsum("ns,nsi->i", share, means)
+        matrix = np.einsum("n,nij->ij", share.sum(axis=1), covariance)
+        matrix -= np.einsum("n,ni,nj->ij", np.sum(share / total, axis=1), along, along)
+        matrix += np.einsum("ns,nsi,nsj->ij", share, means - mean, means - mean)
+        return -mean[:-1], matrix[:-1, :-1]
 
     def amounts(self, number: int) -> tuple[Array, Array]:
         """Posterior mean and covariance of the amounts of a group whose g columns act together.

@@ -44,12 +44,9 @@ _PHASES = 32
 #: stands for an uneven field; and step of ln strain in difference quotients. With this error the 95 % interval of a
 #: radial stiffness factor contained its true value in 115 of 118 simulated campaigns of 14 rubbers of other laws.
 _STRAIN_ERROR, _STRAIN_STEP = 5.0, 1e-3
-#: Loss modulus of relaxation faster than the tests, at their highest frequency, over the deviation of the compound;
-#: chosen on simulated rubber. In 28 campaigns of 7 other rubbers the 95 % interval contained the true delay in 27.
-_FAST_RELAXATION = 1.5
 
 
-def compound(fit: FitResult, count: int = _COMPOUND_PATTERNS, *, fast: bool = False) -> Group | None:
+def compound(fit: FitResult, count: int = _COMPOUND_PATTERNS) -> Group | None:
     """Changes of the residuals if the modulus of the compound deviates smoothly from the model's laws.
 
     The relative deviation is a random function of frequency and strain, the same in all directions and specimens.
@@ -57,7 +54,6 @@ def compound(fit: FitResult, count: int = _COMPOUND_PATTERNS, *, fast: bool = Fa
     Args:
         fit: fitted model and tests.
         count: maximum number of patterns.
-        fast: True to include relaxation faster than the tests, which differs little from a delay.
 
     Returns:
         Group of independent patterns of the deviation, of unit variance at each operating point, and of deviations of
@@ -67,8 +63,7 @@ def compound(fit: FitResult, count: int = _COMPOUND_PATTERNS, *, fast: bool = Fa
         return None
     limits = {"count": count, "correlate": _compound_correlation}
     columns, changes = _smooth_changes(fit, fit.data_sets, COMPOUND_LENGTHS, **limits)
-    parts = [(columns, changes), _strain_changes(fit), *([_fast_relaxation(fit)] if fast else [])]
-    columns, changes = map(np.concatenate, zip(*parts, strict=True))
+    columns, changes = map(np.concatenate, zip((columns, changes), _strain_changes(fit), strict=True))
     for loops in group_repeats(split_by_kind(fit.data_sets)[0]):
         columns = np.concatenate((columns, _repeat_changes(fit, loops, compound_shapes)))
     unit = np.zeros((len(columns), changes.shape[-1]), dtype=complex)
@@ -100,22 +95,21 @@ def _strain_changes(fit: FitResult) -> tuple[Array, Array]:
     return columns, np.concatenate(changes, axis=-1)
 
 
-def _fast_relaxation(fit: FitResult) -> tuple[Array, Array]:
-    """Changes due to a relaxation faster than the tests, in the form of `_smooth_changes`, with one amount.
+def fast_relaxation(fit: FitResult) -> Array:
+    """Changes of the n whitened residuals, (n,), by a relaxation of the compound that is faster than the tests.
 
     Far below its own frequency, a relaxation is a loss modulus that grows as the frequency, like the phase of a delay.
-    The amount is relative to the median modulus |K|/(stiffness per modulus) at the highest frequency.
+    At the highest frequency, its loss modulus is here the median modulus |K|/(stiffness per modulus) of the tests.
     """
-    model, tests = fit.model, fit.data_sets
+    tests = fit.data_sets
     highest = max(float(test.frequency.max()) for test in tests)
-    factors = [stiffness_per_modulus(model.bushing, test.direction) for test in tests]
+    factors = [stiffness_per_modulus(fit.model.bushing, test.direction) for test in tests]
     modulus = np.median(np.concatenate([np.abs(test.measured) / k for test, k in zip(tests, factors, strict=True)]))
-    columns, changes = np.zeros((1, fit.residual.size)), list[Array]()
-    for test, factor in zip(tests, factors, strict=True):
-        change = _FAST_RELAXATION * 1j * modulus * factor * test.frequency[None] / highest
-        columns[:, fit.residual_rows[test]] = test.residual_change(change, model)
-        changes.append(change / model.stiffness(test.direction, test.frequency, test.amplitude, kind=test.kind))
-    return columns, np.concatenate(changes, axis=-1)
+    by_test = [
+        test.residual_change(1j * modulus * factor * test.frequency / highest, fit.model)
+        for test, factor in zip(tests, factors, strict=True)
+    ]
+    return np.concatenate(by_test)
 
 
 def _compound_correlation(points: Array, nodes: Array) -> Array:
