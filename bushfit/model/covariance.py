@@ -6,7 +6,7 @@ from functools import cached_property
 from itertools import combinations
 
 import numpy as np
-from scipy.special import stdtrit
+from scipy.special import chdtri, stdtrit
 
 from bushfit.effects.contract import Array
 
@@ -73,10 +73,15 @@ class Covariance:
     def describe_unknown(self, values: Mapping[str, float]) -> str:
         """Sentence that names the parameters whose 95 % half-width is at least their value; "" if there are none.
 
-        Parameters of the effect `preload` are not named: they are coefficients of one curve, and have no meaning alone.
+        Parameters of the effect `preload` are coefficients of one curve and have no meaning alone. The effect is named
+        if the tests do not distinguish all of them together from zero (Wald's test).
         """
-        names = [name for name in self.names if not name.startswith("preload.")]
-        unknown = ", ".join(name for name in names if self.half_widths[name] >= abs(values[name]))
+        curve = self.restricted([name for name in self.names if name.startswith("preload.")])
+        names = [name for name in self.names if name not in curve.names and self.half_widths[name] >= abs(values[name])]
+        deviations = np.linalg.lstsq(curve.root, np.array([values[name] for name in curve.names]))[0]
+        if curve.names and deviations @ deviations <= chdtri(len(curve.names), 0.05):
+            names.append("preload")
+        unknown = ", ".join(names)
         return unknown and f"the tests do not determine {unknown} (95 % interval of +-100 % or more)"
 
     def freedom(self, slopes: Array) -> Array:
