@@ -49,7 +49,10 @@ def harmonic_shape(x: Array) -> Array:
     >>> harmonic_shape(np.array([0.0, 1.0, 100.0])).round(4)
     array([0.5   +0.j    , 0.1974+0.0755j, 0.0016+0.0058j])
     """
-    s, big, p, q, z = _roots(x)
+    s = np.sqrt(x * (x + 6.0) + 1.0)
+    big = s + x + 1.0
+    p = 1.0 + 2.0 * x / big
+    q, z = np.sqrt(p * (p + 2.0 * x)), 2.0 * x / p
     shape = np.empty(x.shape, dtype=complex)
     square = p * p
     shape.real = square / ((x + p + q) * q)
@@ -64,22 +67,6 @@ def harmonic_shape(x: Array) -> Array:
     return shape
 
 
-def _roots(x: Array) -> tuple[Array, Array, Array, Array, Array]:
-    """Terms of the closed form of the friction loop's first harmonic, see `harmonic_shape`.
-
-    Args:
-        x: strain amplitude over eps_half, not negative, any shape.
-
-    Returns:
-        s = sqrt(x^2 + 6x + 1), D = s + x + 1, p = 1 + 2x/D, q = sqrt(p (p + 2x)) and z = 2x/p, same shape.
-    """
-    twice = 2.0 * x
-    s = np.sqrt(x * (x + 6.0) + 1.0)
-    big = s + x + 1.0
-    p = 1.0 + twice / big
-    return s, big, p, np.sqrt(p * (p + twice)), twice / p
-
-
 def mean_stress_decay(x: Array) -> Array:
     """Decay per cycle of the mean friction stress from the start of a motion: ln(stress before/stress after).
 
@@ -91,7 +78,7 @@ def mean_stress_decay(x: Array) -> Array:
     >>> mean_stress_decay(np.array([0.01, 1.0])).round(4)
     array([8.000e-04, 8.406e-01])
     """
-    z = _roots(x)[-1]
+    z = 2.0 * x / (1.0 + 2.0 * x / (np.sqrt(x * (x + 6.0) + 1.0) + x + 1.0))
     return -2.0 * np.log1p(-np.square(z / (1.0 + z)))
 
 

@@ -12,7 +12,7 @@ from bushfit.effects.contract import Array
 from bushfit.fitting.outliers import NEIGHBOURS, are_outliers, are_stuck, outlier_limit
 from bushfit.fitting.repeats import FLOOR
 from bushfit.reading.measurement import Loop
-from bushfit.reduction.arrays import CHUNK, MEDIAN_TO_SIGMA, by_chunks
+from bushfit.reduction.arrays import MEDIAN_TO_SIGMA
 from bushfit.reduction.harmonics import as_complex, basis, least_squares, resolved_order, series, spread_rows
 
 #: Samples of one cycle where a series is drawn as a curve and the model answers; chosen: rows between two samples are
@@ -244,25 +244,12 @@ def phase_bins(
     starts = number if each_cycle else np.union1d(np.arange(separate), later.astype(np.intp))
     group = np.searchsorted(starts, number, side="right") - 1
     middle = np.round(np.bincount(group, weights=number) / np.bincount(group))
-    edges = np.append(np.arange(int(cycles * GRID) + 1) / (frequency * GRID), np.inf)
-
-    def sums(bins: slice) -> Array:
-        """Sum the rows in each of a range of bins; empty bins are left out.
-
-        Returns:
-            Index of the bin, number of rows, sum of the phase within the bin, and sum of the force, (4, k).
-        """
-        start, stop = np.searchsorted(clock, edges[[bins.start, bins.stop]])
-        first = np.searchsorted(clock[start:stop], edges[bins])
-        filled = np.flatnonzero(np.diff(first, append=stop - start))
-        number, first = filled + bins.start, first[filled]
-        count = np.diff(first, append=stop - start)
-        in_bins = np.add.reduceat(clock[start:stop], first) * (frequency * GRID) - count * number
-        return np.stack((number, count, in_bins, np.add.reduceat(force[start:stop], first)))
-
-    chunks = by_chunks(sums, edges.size - 1, 1 + CHUNK * edges.size // clock.size)
-    bins, *parts = np.concatenate(chunks, axis=1)
-    bins = bins.astype(np.intp)
+    first = np.searchsorted(clock, np.arange(int(cycles * GRID) + 1) / (frequency * GRID))
+    bins = np.flatnonzero(np.diff(first, append=clock.size))
+    first = first[bins]
+    count = np.diff(first, append=clock.size)
+    in_bins = np.add.reduceat(clock, first) * (frequency * GRID) - count * bins
     filled, place = np.unique(GRID * group[bins // GRID] + bins % GRID, return_inverse=True)
+    parts = count, in_bins, np.add.reduceat(force, first)
     rows, inside, total = (np.bincount(place, weights=part) for part in parts)
     return middle[filled // GRID] + (filled % GRID + inside / rows) / GRID, total / rows, rows

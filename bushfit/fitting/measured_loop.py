@@ -3,7 +3,7 @@
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 
@@ -61,7 +61,7 @@ class MeasuredLoop(MeasuredBase):
             in [rig]. An assumed gain error only widens the errors of fitted parameters.
         first_harmonic_errs: True if the model error includes the first harmonic of the force.
 
-        shared_cache: histories of the motion and positions of the rows in them, which copies of the loop share.
+        histories: histories of the motion by their extent, once computed; copies of the loop share them.
 
     Notes:
         The model error is independent between harmonics h, and beyond the fifth proportional to 1/h.
@@ -85,7 +85,7 @@ class MeasuredLoop(MeasuredBase):
     gain_error: float = 0.0
     gain_weighs: bool = False
     first_harmonic_errs: bool = True
-    shared_cache: dict[Hashable, Any] = field(default_factory=dict, repr=False)
+    histories: dict[tuple[bool, bool], History] = field(default_factory=dict, repr=False)
     kind = "loop"
     components = ("force",)
 
@@ -129,7 +129,7 @@ class MeasuredLoop(MeasuredBase):
         """
         is_whole = is_transient and not (self.from_rest or self.has_predecessor)
         extent = self.from_rest, is_whole
-        if extent not in self.shared_cache:
+        if extent not in self.histories:
             frequency = float(self.frequency[0])
             motion = np.fft.irfft(0.5 * GRID * np.append(0.0, self.coefficients[1:]), GRID)
             if self.from_rest:
@@ -139,8 +139,8 @@ class MeasuredLoop(MeasuredBase):
                 half_row = 0.5 * self.cycles / self.test.time.size
                 count = int(np.ceil(self.cycles - half_row)) if is_whole else 1
                 history = History.steady(np.tile(motion, count), frequency, cycles=count)
-            self.shared_cache[extent] = replace(history, accuracy=_ACCURACY)
-        return self.shared_cache[extent]
+            self.histories[extent] = replace(history, accuracy=_ACCURACY)
+        return self.histories[extent]
 
     def interpolate_at_rows(self, response: Array) -> Array:
         """Interpolate a model response at the samples of `history`, (..., samples), to the measured rows, (..., n).
@@ -150,13 +150,10 @@ class MeasuredLoop(MeasuredBase):
         length = response.shape[-1]
         if self.datum is not None and not self.from_rest:
             response = response - response.mean(axis=-1, keepdims=True)
-        if length not in self.shared_cache:
-            position = self.phase * GRID
-            index = position.astype(np.intp)
-            ahead = np.minimum(index + 1, length - 1) if self.from_rest else (index + 1) % length
-            self.shared_cache[length] = index % length, ahead, position - index
-        index, ahead, part = self.shared_cache[length]
-        rows = response.take(index, axis=-1)
+        position = self.phase * GRID
+        index = position.astype(np.intp)
+        ahead, part = np.minimum(index + 1, length - 1) if self.from_rest else (index + 1) % length, position - index
+        rows = response.take(index % length, axis=-1)
         rows *= 1.0 - part
         rows += response.take(ahead, axis=-1) * part
         if self.datum is not None and self.from_rest:

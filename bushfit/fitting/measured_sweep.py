@@ -8,7 +8,7 @@ from typing import Self
 import numpy as np
 
 from bushfit.campaign.schema import Residuals
-from bushfit.effects.contract import UNKNOWN, Array, RubberConditions, Values
+from bushfit.effects.contract import Array, RubberConditions, Values
 from bushfit.fitting.measured_test import MeasuredBase
 from bushfit.fitting.noise import SweepNoise
 from bushfit.fitting.outliers import contradictions, outlying_points
@@ -159,29 +159,9 @@ class MeasuredSweep(MeasuredBase):
         return np.concatenate(([0], 1 + np.flatnonzero(np.any(np.diff(label), axis=0))))
 
     @cached_property
-    def _distinct(self) -> tuple[Array, Array, Array]:
-        """Distinct operating points of the sweep, so that a model is evaluated once for all repeats.
-
-        Returns:
-            Frequency [Hz] and reached amplitude [m or rad] of the d distinct points, (2, d); and, for each of the n
-            points of the sweep, the index of its distinct point, (n,).
-        """
-        points = self.frequency + 1j * self.test.amplitude_reached[self.order]
-        distinct, distinct_index = np.unique(points, return_inverse=True)
-        return distinct.real, distinct.imag, distinct_index
-
-    def _operating_points(self, model: Model) -> tuple[Array, Array, RubberConditions, Array | slice]:
-        """Operating points at which a model has to be evaluated: one for all repeats of a point.
-
-        Returns:
-            Frequency [Hz], amplitude [m or rad] and conditions of the distinct operating points, or of all points if
-            the model depends on temperature or earlier strains; and the index among them of each point of the sweep.
-        """
-        if model.depends_on:
-            reached = self.test.amplitude_reached[self.order]
-            return self.frequency, reached, self.conditions, slice(None)
-        frequency, amplitude, distinct_index = self._distinct
-        return frequency, amplitude, UNKNOWN, distinct_index
+    def reached(self) -> Array:
+        """Zero-to-peak amplitude that the rig reached at each point [m or rad], (n,), where models are evaluated."""
+        return self.test.amplitude_reached[self.order]
 
     def stiffness(self, model: Model, values: Values | None = None) -> Array:
         """Stiffness of a model at the points of the sweep, evaluated once for all repeats of a point.
@@ -195,17 +175,15 @@ class MeasuredSweep(MeasuredBase):
         """
         if values is None and (stiffness := self._recall("stiffness", model)) is not None:
             return stiffness
-        frequency, amplitude, conditions, distinct_index = self._operating_points(model)
-        distinct = model.stiffness(self.direction, frequency, amplitude, values=values, conditions=conditions)
-        stiffness = distinct[..., distinct_index]
+        points = self.direction, self.frequency, self.reached
+        stiffness = model.stiffness(*points, values=values, conditions=self.conditions)
         return stiffness if values is not None else self._keep("stiffness", model, (), stiffness)
 
     def stiffness_slopes(self, model: Model, names: Sequence[str]) -> tuple[Array, Array]:
         """Stiffness of a model at the points of the sweep, complex (n,), and its parameter derivatives, (k, n)."""
-        frequency, amplitude, conditions, distinct_index = self._operating_points(model)
-        points = self.direction, frequency, amplitude
-        stiffness, slopes = stiffness_and_slopes(model, *points, names, conditions=conditions)
-        return self._keep("stiffness", model, (), stiffness[distinct_index]), slopes[:, distinct_index]
+        points = self.direction, self.frequency, self.reached
+        stiffness, slopes = stiffness_and_slopes(model, *points, names, conditions=self.conditions)
+        return self._keep("stiffness", model, (), stiffness), slopes
 
     def residual(self, model: Model, values: Values | None = None) -> Array:
         """Whitened residuals: model minus measured in units of noise, (..., 2 n); see `MeasuredBase`."""

@@ -5,7 +5,7 @@ step, and one without. The differences are one-sided, which halves the cost of c
 of 1e-6 is small enough for a fit.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import cast
 
 import numpy as np
@@ -49,11 +49,9 @@ def stiffness_and_slopes(
     >>> slopes.round(4)
     array([[0.3634+0.j]])
     """
-
-    def respond(values: Values) -> Array:
-        return model.stiffness(direction, frequency, amplitude, kind=kind, values=values, conditions=conditions)
-
-    return differences(model, names, respond, direction)
+    values, steps = stepped_values(model, names, direction)
+    stiffness = model.stiffness(direction, frequency, amplitude, kind=kind, values=values, conditions=conditions)
+    return difference_quotients(stiffness, steps)
 
 
 def force_and_slopes(
@@ -71,41 +69,45 @@ def force_and_slopes(
     Returns:
         Force [N or N m], (n,), and its derivatives per SI unit of each parameter, (k, n).
     """
-
-    def respond(values: Values) -> Array:
-        return model.force(direction, displacement, kind="loop", values=values, conditions=conditions)
-
-    return differences(model, names, respond, direction)
+    values, steps = stepped_values(model, names, direction)
+    force = model.force(direction, displacement, kind="loop", values=values, conditions=conditions)
+    return difference_quotients(force, steps)
 
 
-def differences(
-    model: Model, names: Sequence[str], respond: Callable[[Values], Array], place: Place | None = None
-) -> tuple[Array, Array]:
-    """Response of a model and its derivatives with respect to parameters, by one-sided differences inside the bounds.
+def stepped_values(model: Model, names: Sequence[str], place: Place) -> tuple[Values, Array]:
+    """Parameter values along a leading axis: one row for each parameter with a step, and a last row without.
 
     Args:
-        model: model; the derivatives are taken at its parameter values.
+        model: model; the last row has its parameter values.
         names: names of k parameters.
-        respond: function from parameter values to the response, (..., n), called once; the values are numbers, or
-            arrays with one more entry than there are derivatives to compute.
-        place: direction or specimen of the response; derivatives with respect to parameters of other directions, such
-            as `stiffness_factor.radial`, are 0 and are not computed. None to compute all.
+        place: direction or specimen; parameters of other directions, such as `stiffness_factor.radial`, have no row,
+            because their derivatives are 0.
 
     Returns:
-        Response, (n,), and its derivatives per SI unit of each parameter, (k, n).
+        Values by name, numbers or (rows + 1, 1); and the step of each of the k parameters inside its bounds, or 0 for a
+        parameter without a row, (k, 1).
     """
     labels = place.labels if isinstance(place, Specimen) else (str(place),)
-    local = [i for i, name in enumerate(names) if place is None or place_suffix(name) in (None, *labels)]
-    count, stacked = len(local), dict[str, Value](model.values)
-    steps = np.empty((count, 1))
-    for row, name in enumerate(names[i] for i in local):
+    local = [name for name in names if place_suffix(name) in (None, *labels)]
+    stacked, steps = dict[str, Value](model.values), np.zeros((len(names), 1))
+    for row, name in enumerate(local):
         parameter, value = model.parameters[name], model.values[name]
         step = _RELATIVE_STEP * (abs(value) if parameter.log and value else parameter.typical)
-        column = np.full((count + 1, 1), value)
+        stacked[name] = column = np.full((len(local) + 1, 1), value)
         column[row] += step if value + step <= parameter.bounds[1] else -step
-        stacked[name], steps[row] = column, column[row] - value
-    responses = respond(cast(Values, stacked))
-    responses = np.broadcast_to(responses, (count + 1, responses.shape[-1]))
-    slopes = np.zeros((len(names), responses.shape[-1]), dtype=responses.dtype)
-    slopes[local] = (responses[:count] - responses[count]) / steps
-    return responses[count], slopes
+        steps[list(names).index(name)] = column[row] - value
+    return cast(Values, stacked), steps
+
+
+def difference_quotients(responses: Array, steps: Array) -> tuple[Array, Array]:
+    """Response of a model, (n,), and its derivatives by k parameters, (k, n), from the result of `stepped_values`.
+
+    Args:
+        responses: responses for the stepped values, (rows + 1, n), or (n,) if no value is stepped or has an effect.
+        steps: step of each parameter, 0 for those without a row, (k, 1).
+    """
+    stepped = steps[:, 0] != 0.0
+    rows, slopes = int(np.count_nonzero(stepped)), np.zeros((len(steps), responses.shape[-1]), dtype=responses.dtype)
+    responses = np.broadcast_to(responses, (rows + 1, responses.shape[-1]))
+    slopes[stepped] = (responses[:rows] - responses[rows]) / steps[stepped]
+    return responses[rows], slopes

@@ -51,8 +51,6 @@ class Stack:
         values: parameter values [SI] by qualified name; arrays whose last axis has length 1 add leading axes.
         layers: layers to include, from the rubber outward, with their parameter values.
         modified: False for the stiffness of the rubber without its modifiers, which a modifier may use.
-        last_moduli: time step [s] of the last steady cycle, and the modulus [Pa] of the linear branches at each of its
-            harmonics, by number of samples.
     """
 
     model: Model
@@ -60,7 +58,6 @@ class Stack:
     values: Values
     layers: list[tuple[Layer, Values]] = field(default_factory=list)
     modified: bool = True
-    last_moduli: dict[int, tuple[Any, Array]] = field(default_factory=dict)
 
     @cached_property
     def below(self) -> Stack:
@@ -125,23 +122,11 @@ class Stack:
             values = self.adjusted_values(omega, displacement.amplitude, strain.amplitude)
             if any(modifier.shift_factor for modifier in structure.modifiers):
                 strain = strain.faster(model.shift_factor(setting.conditions, self.values))
-        together = displacement.periodic and structure.viscoelastic
         for branch in structure.branches:
-            if not (together and branch.size):
-                stress = stress + branch.stress(values_for_effect(branch, values), strain)
+            stress = stress + branch.stress(values_for_effect(branch, values), strain)
         for modifier in structure.modifiers:
             if modifier.stress:
                 stress = stress + modifier.stress(values_for_effect(modifier, self.values), strain, setting)
-        if together:  # the linear branches add up harmonic by harmonic; motions of one time step share their moduli
-            count = strain.value.shape[-1]
-            step, moduli = self.last_moduli.get(count, (None, np.zeros(1)))
-            if step is not strain.step or structure.modifiers:
-                moduli = np.zeros(1)
-                for branch in structure.viscoelastic:
-                    branch_values = values_for_effect(branch, values)
-                    moduli = moduli + branch.modulus(branch_values, strain.harmonics, strain.amplitude)
-                self.last_moduli[count] = strain.step, moduli
-            stress = stress + 2.0 * np.fft.irfft(moduli * strain.spectrum, n=count)
         return model.stiffness_per_modulus(setting.direction) / (2.0 * per_displacement) * stress
 
     def adjusted_values(self, omega: Array, amplitude: Array, strain: Array) -> Values:

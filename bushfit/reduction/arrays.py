@@ -1,16 +1,11 @@
-"""Robust statistics of long arrays, and their evaluation in chunks on all cores."""
+"""Robust statistics of long arrays."""
 
-import os
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from math import comb
-from typing import TypeVar
 
 import numpy as np
 
 from bushfit.reading.measurement import Floats
 
-_Chunk = TypeVar("_Chunk")
 #: Standard deviation of normal scatter over the median of its absolute values, 1/Phi^-1(3/4).
 MEDIAN_TO_SIGMA = 1.482602218505602
 #: Entries of a chunk: 2 MiB of float64, which a core's cache holds.
@@ -43,23 +38,3 @@ def median(values: Floats, axis: int = 0) -> Floats:
     middle = ordered.shape[axis] // 2
     low = middle - 1 + ordered.shape[axis] % 2
     return np.asarray((ordered.take(low, axis) + ordered.take(middle, axis)) / 2.0)
-
-
-def by_chunks(work: Callable[[slice], _Chunk], size: int, chunk: int = CHUNK) -> list[_Chunk]:
-    """Apply a function to the chunks of a long array, in threads on all cores.
-
-    The chunks, and so the numerical results, are the same on any number of cores.
-
-    Args:
-        work: function of a slice of the array.
-        size: number of entries of the array.
-        chunk: number of entries of a chunk.
-
-    Returns:
-        Results of the function, in the order of the chunks.
-    """
-    chunks = [slice(start, min(start + chunk, size)) for start in range(0, size, chunk)]
-    if len(chunks) < 2:
-        return [work(entries) for entries in chunks]
-    with ThreadPoolExecutor(os.cpu_count()) as threads:
-        return list(threads.map(work, chunks))
