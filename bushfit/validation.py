@@ -209,16 +209,16 @@ def _table_at(table: type, location: tuple[int | str, ...]) -> type:
     """Dataclass that describes the table at a location below another table, or the nearest dataclass above it."""
     for key in location:
         if key in (hints := get_type_hints(table)):
-            inside = (part for part in _parts(hints[key]) if isinstance(part, type) and is_dataclass(part))
+            inside = (part for part in _type_arguments(hints[key]) if isinstance(part, type) and is_dataclass(part))
             table = next(inside, table)
     return table
 
 
-def _parts(hint: Any) -> Iterable[Any]:
+def _type_arguments(hint: Any) -> Iterable[Any]:
     """Yield a type hint and, recursively, its arguments, such as list[int] and int."""
     yield hint
     for part in get_args(hint):
-        yield from _parts(part)
+        yield from _type_arguments(part)
 
 
 #: Largest mass [kg], acceleration [m/s^2] and frequency [Hz] of a resonance test; the least is the inverse.

@@ -39,7 +39,7 @@ def find_outliers(quantities: Mapping[str, tuple[Array, Array]]) -> tuple[dict[s
         usual = np.isfinite(values)
         removed, outlier_count = list[int](), 0
         for step in range(int(usual.sum()) // _PARTS_PER_OUTLIER):
-            z = _studentised(values, errors, usual)
+            z = _studentised_deviations(values, errors, usual)
             if not np.isfinite(z[usual]).any():  # the others agree to the digit
                 break
             worst = int(np.nanargmax(np.where(usual, np.abs(z), np.nan)))
@@ -51,7 +51,7 @@ def find_outliers(quantities: Mapping[str, tuple[Array, Array]]) -> tuple[dict[s
     outlying_parts = np.any([*outliers.values()], axis=0)
     for name, (values, errors) in quantities.items():
         usual = usual_parts(values, name, outliers)
-        deviations[name] = _studentised(values, errors, usual)
+        deviations[name] = _studentised_deviations(values, errors, usual)
         limit = smallest_deviation(int(usual.sum()) + 1, len(quantities)) or math.inf
         outliers[name] |= outlying_parts & (np.abs(deviations[name]) > limit)
     return deviations, outliers
@@ -74,7 +74,7 @@ def usual_parts(values: Array, name: str, outliers: Mapping[str, Array]) -> Arra
     return usual if usual.sum() >= FEWEST - 1 else finite & ~outliers[name]
 
 
-def _studentised(values: Array, errors: Array, usual: Array) -> Array:
+def _studentised_deviations(values: Array, errors: Array, usual: Array) -> Array:
     """Deviation of each value from the mean of the other reference values, in their standard deviations, (n,).
 
     Args:

@@ -51,7 +51,7 @@ def without_copied_tests(tests: Sequence[_Test]) -> list[_Test]:
     remaining = []
     for first, *copies in group_copies(tests):
         files = [copy.source.file.name if copy.source else copy.name for copy in copies]
-        remaining.append(_with_note(first, f"{_listed(files)} with the same data: used once") if files else first)
+        remaining.append(_with_note(first, f"{_join_names(files)} with the same data: used once") if files else first)
     return remaining
 
 
@@ -80,8 +80,8 @@ def without_copied_repeats(sweep: Sweep) -> Sweep:
     columns = {name: getattr(sweep, name) for name in names}
     columns = {name: values[~is_copy] for name, values in columns.items() if isinstance(values, np.ndarray)}
     note = (
-        f"{points} points of repeat{'s' * (len(repeats) > 1)} {_listed([*map(str, repeats)])} are exact copies of an "
-        "earlier repeat and are left out; row numbers in messages skip the copies"
+        f"{points} points of repeat{'s' * (len(repeats) > 1)} {_join_names([*map(str, repeats)])} are exact copies of "
+        "an earlier repeat and are left out; row numbers in messages skip the copies"
     )
     return _with_note(replace(sweep, **columns), note)
 
@@ -101,6 +101,6 @@ def _with_note(test: _Test, note: str) -> _Test:
     return replace(test, source=source and source.with_note(note))
 
 
-def _listed(names: Sequence[str]) -> str:
+def _join_names(names: Sequence[str]) -> str:
     """Join names as in "a, b and c"."""
     return " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))

@@ -74,7 +74,7 @@ def schema(name: str) -> dict[str, Any]:
         "$id": f"urn:bushfit:schema:{name}",
         "title": f"bushfit {name}: {described.files}",
     }
-    return {**head, **{key: value for key, value in _tidied(generated).items() if key != "title"}}
+    return {**head, **{key: value for key, value in _remove_unsupported(generated).items() if key != "title"}}
 
 
 def _generator(way: str) -> Any:
@@ -98,16 +98,16 @@ def _generator(way: str) -> Any:
 
         def dataclass_schema(self, schema: Any) -> dict[str, Any]:
             """Schema of a dataclass with the descriptions of its keys."""
-            return _explained(super().dataclass_schema(schema), schema["cls"])
+            return _add_descriptions(super().dataclass_schema(schema), schema["cls"])
 
         def typed_dict_schema(self, schema: Any) -> dict[str, Any]:
             """Schema of a TypedDict with the descriptions of its keys."""
-            return _explained(super().typed_dict_schema(schema), schema["cls"])
+            return _add_descriptions(super().typed_dict_schema(schema), schema["cls"])
 
     return Generator
 
 
-def _explained(table_schema: dict[str, Any], kind: type) -> dict[str, Any]:
+def _add_descriptions(table_schema: dict[str, Any], kind: type) -> dict[str, Any]:
     """Add the descriptions in the docstring of a table's type to its schema."""
     from bushfit.validation import inline_fields
 
@@ -131,9 +131,9 @@ def _explained(table_schema: dict[str, Any], kind: type) -> dict[str, Any]:
     return {**table_schema, "description": " ".join(words.split())}
 
 
-def _tidied(node: Any) -> Any:
+def _remove_unsupported(node: Any) -> Any:
     """Remove keywords unknown to JSON Schema, and defaults of null, from a schema."""
     if isinstance(node, Mapping):
         keywords = (key for key, value in node.items() if key not in _NO_KEYWORDS and (key, value) != ("default", None))
-        return {key: _tidied(node[key]) for key in keywords}
-    return [_tidied(item) for item in node] if isinstance(node, list) else node
+        return {key: _remove_unsupported(node[key]) for key in keywords}
+    return [_remove_unsupported(item) for item in node] if isinstance(node, list) else node

@@ -143,7 +143,7 @@ def _shorten_sweep(data_set: MeasuredSweep) -> _ShortSweep | None:
     if not long and not sentence:
         return None
     keys = np.stack((level_of_row, repeat.astype(float), band.astype(float)))
-    means, conditions, counts = _averaged(data_set, rows, keys)
+    means, conditions, counts = _average_points(data_set, rows, keys)
     if means.frequency.size < rows.size:
         counted = f"{rows.size} points are averaged to {means.frequency.size} narrow bands for the diagnosis"
         sentence = "; ".join(filter(None, (sentence, counted)))
@@ -151,7 +151,7 @@ def _shorten_sweep(data_set: MeasuredSweep) -> _ShortSweep | None:
     return _ShortSweep(means, conditions, ratios, sentence)
 
 
-def _averaged(data_set: MeasuredSweep, rows: Array, keys: Array) -> tuple[Sweep, RubberConditions, Array]:
+def _average_points(data_set: MeasuredSweep, rows: Array, keys: Array) -> tuple[Sweep, RubberConditions, Array]:
     """Average the points of a sweep that have equal keys; |K| and the stepped quantity are averaged geometrically.
 
     Args:

@@ -24,7 +24,7 @@ _ANGLES = np.pi * np.arange(1, _NODES + 1) / (_NODES + 1)
 _WEIGHTS, _STRAINS = 2.0 / (_NODES + 1) * np.sin(_ANGLES) ** 2, np.sin(0.5 * _ANGLES) ** 2
 
 
-def _standardised(strain: Value, e_s: Value, spread: Value) -> Array:
+def _standard_strain(strain: Value, e_s: Value, spread: Value) -> Array:
     """Return z = ln(strain/e_s)/spread: a share Phi(z) of the elements yields below this strain, (..., n).
 
     Args:
@@ -60,8 +60,8 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
     """
     e_s, spread = np.atleast_1d(p["e_s"]), np.atleast_1d(p["spread"])
     strain = np.maximum(strain, 1e-30 * e_s)
-    nodes = _standardised(strain[..., None] * _STRAINS, e_s[..., None], spread[..., None])
-    z = _standardised(strain, e_s, spread)
+    nodes = _standard_strain(strain[..., None] * _STRAINS, e_s[..., None], spread[..., None])
+    z = _standard_strain(strain, e_s, spread)
     first, second = ((e_s / strain) ** j * np.exp(0.5 * (j * spread) ** 2) * ndtr(z - j * spread) for j in (1, 2))
     return p["delta"] * (ndtr(-nodes) @ _WEIGHTS + 4.0j / np.pi * (first - second))
 
@@ -77,7 +77,7 @@ def _first_loading(strain: Array, e_s: Value, spread: Value) -> Array:
     Returns:
         Mean elastic strain, the stress divided by 2 delta [1], (..., n).
     """
-    z = _standardised(strain, e_s, spread)
+    z = _standard_strain(strain, e_s, spread)
     return strain * ndtr(-z) + e_s * np.exp(0.5 * spread**2) * ndtr(z - spread)
 
 

@@ -12,7 +12,7 @@ from bushfit.effects.springpot import power_of_rate
 _ECHO = 1e-8
 
 
-def _scaled(p: Values) -> Array:
+def _relaxation_time_power(p: Values) -> Array:
     """Relaxation time tau of springpot and spring, to the power alpha: tau^alpha = c/(2 pi 25 Hz)^alpha [s^alpha]."""
     return np.asarray(p["c"]) / np.power(2.0 * np.pi * REFERENCE_FREQUENCY, p["alpha"])
 
@@ -36,7 +36,7 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
     array([-0.1-0.4j, -2.6-6.3j])
     """
     rate = power_of_rate(p["alpha"], omega)
-    turn = _scaled(p) * rate
+    turn = _relaxation_time_power(p) * rate
     return -0.5 * p["m"] * rate * turn / (1.0 + turn)
 
 
@@ -74,7 +74,7 @@ def stress(p: Values, history: History) -> Array:
     if history.periodic:
         return linear_stress(modulus, p, history)
     count = history.value.shape[-1]
-    alpha, scaled, step = (np.atleast_1d(value) for value in (p["alpha"], _scaled(p), history.step))
+    alpha, scaled, step = (np.atleast_1d(value) for value in (p["alpha"], _relaxation_time_power(p), history.step))
     length = next_fast_len(2 * count, real=True)
     logarithm, powers = _circle(length)
     value = np.exp(alpha * logarithm)

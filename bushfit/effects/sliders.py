@@ -62,7 +62,7 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
     return 0.5 * p["sigma"] / np.log(high / low) * whole
 
 
-def _loaded(strain: Array, low: Value, high: Value) -> Array:
+def _first_loading(strain: Array, low: Value, high: Value) -> Array:
     """Stress of the sliders on first loading from rest, over their largest stress: mean of min(strain/e_y, 1).
 
     Args:
@@ -94,7 +94,9 @@ def stress(p: Values, history: History) -> Array:
     if history.periodic and turning.strides.shape[-1] == 2:  # to and fro
         low, high = _ends(p)
         sense = turning.at_samples(np.sign(turning.strides))
-        extension = 2.0 * _loaded(np.abs(turning.travel) / 2.0, low, high) - _loaded(history.amplitude, low, high)
+        extension = 2.0 * _first_loading(np.abs(turning.travel) / 2.0, low, high) - _first_loading(
+            history.amplitude, low, high
+        )
         return p["sigma"] * sense * extension
     slip = np.atleast_1d(p["e_s"])[..., None] * np.exp(np.asarray(p["spread"])[..., None] * _PLACES)
     return p["sigma"] * parallel_elements(history, slip, np.full(slip.shape, 1.0 / _COUNT))

@@ -213,7 +213,7 @@ class Descent:
         outward = ((self.point <= lowest) & (slope >= 0.0)) | ((self.point >= highest) & (slope <= 0.0))
         free, step = (size > _LEAST_SENSITIVITY) & ~outward, np.zeros_like(slope)
         while free.any():
-            step[free] = -_solved(damped, slope + damped[:, ~free] @ step[~free], free)
+            step[free] = -_solve(damped, slope + damped[:, ~free] @ step[~free], free)
             aim = self.point + step
             outside = free & ((aim < low) | (aim > high))
             if not outside.any():
@@ -244,7 +244,7 @@ class Descent:
             return np.zeros_like(step)
         free, bend = (size > _LEAST_SENSITIVITY) & (step != 0.0), np.zeros_like(step)
         pull = self.jacobian @ second * (lengths[0] / lengths[1]) ** 2
-        bend[free] = -0.5 * _solved(curvature + np.diag(damping * size), pull, free)
+        bend[free] = -0.5 * _solve(curvature + np.diag(damping * size), pull, free)
         return bend
 
     def _length(self, step: Array) -> float:
@@ -252,7 +252,7 @@ class Descent:
         return float(np.sqrt(np.diag(self._normal[0]) @ np.square(step)))
 
 
-def _solved(curvature: Array, pull: Array, free: Array) -> Array:
+def _solve(curvature: Array, pull: Array, free: Array) -> Array:
     """Solve curvature @ step = pull for the free parameters; along numerically undetermined combinations the step is 0.
 
     Args:

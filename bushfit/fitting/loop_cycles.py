@@ -50,10 +50,10 @@ def steady_cycles(loop: Loop) -> tuple[Loop, float, float, str | None]:
     Raises:
         FitError: the loop does not contain a whole cycle, or rows are missing in its steady part.
     """
-    time, motion = _thinned(loop)
+    time, motion = _thin_rows(loop)
     part, note = _steady_part(loop, time, motion)
     if part is not loop:
-        time, motion = _thinned(part)
+        time, motion = _thin_rows(part)
     frequency, cycles = _fundamental(part, time, motion)
     widest = int(np.argmax(np.diff(time)))
     if time[widest + 1] - time[widest] > HOLE / frequency:
@@ -68,7 +68,7 @@ def steady_cycles(loop: Loop) -> tuple[Loop, float, float, str | None]:
     return part, frequency, cycles, note
 
 
-def _thinned(loop: Loop) -> tuple[Array, Array]:
+def _thin_rows(loop: Loop) -> tuple[Array, Array]:
     """Time [s] and displacement [m or rad] of every k-th row, enough to find the cycles, without gross outliers."""
     selection = slice(None, None, -(-loop.time.size // ENOUGH_ROWS))
     time, motion = loop.time[selection], loop.displacement[selection]
@@ -92,7 +92,7 @@ def _steady_part(loop: Loop, time: Array, motion: Array) -> tuple[Loop, str | No
 
     Args:
         loop: the whole record.
-        time, motion: time [s] and displacement [m or rad] of every k-th row, from `_thinned`, (n,) each.
+        time, motion: time [s] and displacement [m or rad] of every k-th row, from `_thin_rows`, (n,) each.
     """
     period = _period(time, motion)
     if period is None or time[-1] - time[0] <= period:
@@ -102,7 +102,7 @@ def _steady_part(loop: Loop, time: Array, motion: Array) -> tuple[Loop, str | No
         starts, ends = time[np.append(0, holes + 1)], time[np.append(holes, time.size - 1)]
         first, last = max(zip(starts, ends, strict=True), key=lambda part: part[1] - part[0])
         whole = _cut(loop, first, last)
-        part, note = _steady_part(whole, *_thinned(whole))
+        part, note = _steady_part(whole, *_thin_rows(whole))
         sentence = f"rows are missing; of {time[-1] - time[0]:.3g} s only {first:.4g} to {last:.4g} s are used"
         return part, sentence if note is None else f"{sentence}; in this part, {note}"
     spans = steady_spans(loop, time, motion)
@@ -145,7 +145,7 @@ def _fundamental(loop: Loop, clock: Array, displacement: Array) -> tuple[float, 
 
     Args:
         loop: steady cycles of the record.
-        clock, displacement: time [s] and displacement [m or rad] of every k-th row, from `_thinned`, (n,) each.
+        clock, displacement: time [s] and displacement [m or rad] of every k-th row, from `_thin_rows`, (n,) each.
 
     Notes:
         Several cycles are counted by crossings of the middle in one direction, and their frequency is refined by
@@ -158,7 +158,7 @@ def _fundamental(loop: Loop, clock: Array, displacement: Array) -> tuple[float, 
     same_sense = max(times[x[after] > 0.0], times[x[after] < 0.0], key=len)
     if same_sense.size > 1:
         counted = (same_sense.size - 1) / float(same_sense[-1] - same_sense[0])
-        frequency = _refined(clock, x, counted, rows / (closed * counted))
+        frequency = _refine_frequency(clock, x, counted, rows / (closed * counted))
         return frequency, closed * frequency
     return _of_one_cycle(loop, clock, x, times)
 
@@ -183,7 +183,7 @@ def _of_one_cycle(loop: Loop, clock: Array, x: Array, crossings: Array) -> tuple
     stroke = float(crossings[1] - crossings[0]) if crossings.size == 2 else np.inf
     meets = gap < _CLOSED * np.ptp(x) / 2.0 + 1.5 * stride
     if closed > (_MORE_THAN_ONE_THAT_MEETS if meets else _MORE_THAN_ONE) * 2.0 * stroke:
-        frequency = _refined(clock, x, 0.5 / stroke, rows)
+        frequency = _refine_frequency(clock, x, 0.5 / stroke, rows)
         if closed * frequency > 1.0 and _repeats(clock, x, 1.0 / frequency):
             return frequency, closed * frequency
     if gap > _OPEN * np.ptp(x):
@@ -222,7 +222,7 @@ def _period_by_ends(clock: Array, x: Array, duration: float, whole: float) -> fl
     return period if period < whole - max(1.5 * step, 4.0 * error) else whole
 
 
-def _refined(clock: Array, x: Array, frequency: float, rows_per_cycle: float) -> float:
+def _refine_frequency(clock: Array, x: Array, frequency: float, rows_per_cycle: float) -> float:
     """Refine the frequency of several cycles by Gauss-Newton on the harmonics of the motion.
 
     Args:

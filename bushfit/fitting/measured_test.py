@@ -161,13 +161,13 @@ class MeasuredBase(ABC):
         return float(np.linalg.norm(difference, axis=0).max())
 
     @cached_property
-    def _last(self) -> dict[str, tuple[Model, Any, Array]]:
+    def _cache(self) -> dict[str, tuple[Model, Any, Array]]:
         """Cache for `_recall` and `_keep`: by name of the quantity, its model, parameter names and last array."""
         return {}
 
     def _recall(self, key: str, model: Model, names: Any = ()) -> Array | None:
         """Return the array that `_keep` cached for the same key, model and parameter names; None if there is none."""
-        last = self._last.get(key)
+        last = self._cache.get(key)
         return last[2] if last and last[0] is model and last[1] == names else None
 
     def _keep(self, key: str, model: Model, names: Any, values: Array) -> Array:
@@ -180,7 +180,7 @@ class MeasuredBase(ABC):
             values: array to cache.
         """
         values.flags.writeable = False
-        self._last[key] = model, names, values
+        self._cache[key] = model, names, values
         return values
 
 

@@ -122,7 +122,7 @@ def with_model_error(
     if not plain_fit.names:
         return plain_fit, None
     if not (certain or (not smooth and _exceeds_noise(plain_fit, rig))):
-        thinned = _thinned(plain_fit.problem.tests)
+        thinned = _thin_sweeps(plain_fit.problem.tests)
         rig_errors = [_errors_of_class(test, rig) for test in thinned]
         if not _is_smooth(FittedTests(plain_fit.reevaluate(plain_fit.model, thinned), rig_errors)):
             return plain_fit, None
@@ -130,7 +130,7 @@ def with_model_error(
     if size >= SIZES[-1]:  # that is no error of a model, but another thing than it
         return plain_fit, None
     with_levels = _with_unseen_level_errors(plain_fit.problem.tests, rig)
-    tests = FittedTests(closest.reevaluate(closest.model, _thinned(with_levels, size)))
+    tests = FittedTests(closest.reevaluate(closest.model, _thin_sweeps(with_levels, size)))
     sizes = np.geomspace(_SMOOTH_RATIO[0] * size, _SMOOTH_RATIO[1] * size, 9)
     processes = [replace(process, sizes=sizes) for process in discrepancies(tests)]
     likeliest = max(processes, key=lambda process: process.best[0])
@@ -242,7 +242,7 @@ def log_likelihood(solution: FitResult, prior_precision: Mapping[str, float]) ->
     """
     size = max(test.model_error for test in solution.problem.tests)
     bare = [replace(test, model_error=0.0) for test in solution.problem.tests]
-    tests = FittedTests(solution.reevaluate(solution.model, _thinned(bare, size)))
+    tests = FittedTests(solution.reevaluate(solution.model, _thin_sweeps(bare, size)))
     rows, residual = tests.free_jacobian, tests.solution.residual
     information, gain = rows @ rows.T, 0.0
     if size:
@@ -325,7 +325,7 @@ def _errors_of_class(test: MeasuredTest, rig: RigSettings) -> Array:
     return columns * np.tile(uncounted, len(columns) // 2)[:, None]
 
 
-def _thinned(tests: Sequence[MeasuredTest], error: float = 0.0) -> list[MeasuredTest]:
+def _thin_sweeps(tests: Sequence[MeasuredTest], error: float = 0.0) -> list[MeasuredTest]:
     """Reduce dense sweeps to at most 600 evenly chosen points, enough to estimate a smooth error of the model.
 
     Args:

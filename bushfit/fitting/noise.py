@@ -138,7 +138,7 @@ def sweep_noise(sweeps: Sequence[Sweep], rig: RigSettings = UNSTATED) -> SweepNo
             lines[key] = replace(line, scatter=line.scatter / ((line.steps / reference) ** exponent)[:, None])
     repeated = [line for line in lines.values() if line.shared_freedom]
     measured = repeated or [line for line in lines.values() if line.scatter_without_largest is not None]
-    variances, scatter_freedom = _pooled(lines, measured)
+    variances, scatter_freedom = _pool_variances(lines, measured)
     stated_noise = {name: sweep.noise for name, sweep in by_name.items() if sweep.noise is not None}
     for name, sweep in by_name.items():
         if sweep.noise is None and sweep.relative_error is not None:
@@ -154,13 +154,13 @@ def sweep_noise(sweeps: Sequence[Sweep], rig: RigSettings = UNSTATED) -> SweepNo
         largest = np.maximum(largest_error(rig), largest_error(UNSTATED))  # [rig] states what repeats share
         excesses = dict[str, str]()
         for name in by_name:
-            error = _shared([line for key, line in lines.items() if key[0] == name], rig)
+            error = _shared_errors([line for key, line in lines.items() if key[0] == name], rig)
             if np.any(error > largest):
                 excesses[name] = (
                     f"repeats differ as a whole by an error of {format_class_errors(_pair(error))}, more than a rig of "
                     f"this class causes, {describe_class(rig)}. Measure again, or state the class under [rig]"
                 )
-        errors = _pair(_shared(repeated, rig)), "repeats", freedom, scatter_freedom
+        errors = _pair(_shared_errors(repeated, rig)), "repeats", freedom, scatter_freedom
         return SweepNoise(random, *errors, slopes, class_errors(rig, (0.0, 0.0)), excess_warnings=excesses)
     if all(sweep.noise is not None for sweep in sweeps):
         return SweepNoise(random, class_errors(rig, (0.0, 0.0)), "stated", 0, scatter_freedom)
@@ -201,7 +201,9 @@ def _scatter_growth(lines: Sequence[LineNoise]) -> tuple[float, float] | None:
     return exponent / 2.0, float(np.exp(np.concatenate(logs).mean()))
 
 
-def _pooled(lines: Mapping[LineKey, LineNoise], measured: Sequence[LineNoise]) -> tuple[dict[LineKey, Array], int]:
+def _pool_variances(
+    lines: Mapping[LineKey, LineNoise], measured: Sequence[LineNoise]
+) -> tuple[dict[LineKey, Array], int]:
     """Variances of gain [1] and phase [rad^2] from point to point of each line, pooled over lines that agree.
 
     With few degrees of freedom gain and phase share one variance, unless they differ significantly.
@@ -235,7 +237,7 @@ def _pooled(lines: Mapping[LineKey, LineNoise], measured: Sequence[LineNoise]) -
     return by_line, round(min(line.freedom for line in well_known))
 
 
-def _shared(lines: Sequence[LineNoise], rig: RigSettings) -> Array:
+def _shared_errors(lines: Sequence[LineNoise], rig: RigSettings) -> Array:
     """Standard deviations of relative gain and phase [rad] errors shared by the points of a run, (2,), from repeats.
 
     Outlying pairs are left out. Few repeats often agree by chance: below `_ENOUGH` degrees of freedom the variance is

@@ -265,7 +265,7 @@ class PreparedCampaign:
     def static_loops(self) -> list[MeasuredLoop]:
         """Loops that `fit-static` uses: axial loops; without these, all loops of the bushing; else all loops."""
         hint = "add a quasi-static loop, or run bushfit fit for the sweeps alone"
-        return _preferred(self.require_tests(self.loops, "fit-static needs a loop", hint, "no [[loops]]"))
+        return _preferred_tests(self.require_tests(self.loops, "fit-static needs a loop", hint, "no [[loops]]"))
 
     @cached_property
     def smallest_sweep(self) -> MeasuredSweep:
@@ -279,7 +279,7 @@ class PreparedCampaign:
         """
         hint = "add a stepped-sine file, or run bushfit fit-static for the loops alone"
         available = self.require_tests(self.sweeps, "fit-dynamic needs a sweep", hint, "no [[sweeps]]")
-        sweeps = _preferred([sweep for sweep in available if sweep.test.stepped == "frequency"] or available)
+        sweeps = _preferred_tests([sweep for sweep in available if sweep.test.stepped == "frequency"] or available)
         wanted = self.campaign.fit.dynamic_amplitudes
         if not wanted:
             sweep = min(sweeps, key=lambda sweep: float(sweep.amplitude.min()))
@@ -303,7 +303,7 @@ class PreparedCampaign:
         )
 
 
-def _preferred(data_sets: Sequence[_Kind]) -> list[_Kind]:
+def _preferred_tests(data_sets: Sequence[_Kind]) -> list[_Kind]:
     """Select the axial tests, else all tests of the bushing, else all tests; only those at the smallest preload."""
     axial = [test for test in data_sets if test.direction.axis is Direction.AXIAL]
     tests = axial or [test for test in data_sets if test.direction.axis] or list(data_sets)

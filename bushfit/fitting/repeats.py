@@ -91,9 +91,11 @@ def line_noise(sweep: Sweep, log_stiffness: Array, held_value: float, disturbed:
         if usual.sum() < FEWEST_STEPS:
             continue
         difference, pair_steps = (one - second)[usual], steps[usual]
-        spread = _parts(np.diff(difference)) / np.sqrt(2.0)
+        spread = _gain_and_phase(np.diff(difference)) / np.sqrt(2.0)
         free = difference_freedom(len(spread))
-        shared.append((_parts(difference).mean(axis=0) ** 2 - np.square(spread).mean(axis=0) / len(difference)) / 2.0)
+        shared.append(
+            (_gain_and_phase(difference).mean(axis=0) ** 2 - np.square(spread).mean(axis=0) / len(difference)) / 2.0
+        )
         scatter.append(spread * np.sqrt(free / len(spread) / numbers.size))
         between.append(np.sqrt(pair_steps[1:] * pair_steps[:-1]))
         freedom += free
@@ -121,7 +123,7 @@ def _is_typical(difference: Array, log_step: Array) -> Array:
     usual = ~np.isnan(difference)
     if np.count_nonzero(usual) < FEWEST_SOUGHT:
         return usual
-    parts = _parts(difference)
+    parts = _gain_and_phase(difference)
     distance = np.abs(parts - median(parts[usual]))
     scale = MEDIAN_TO_SIGMA * median(distance[usual])
     lengths = np.log(np.maximum(np.hypot(*distance.T), FLOOR))
@@ -143,7 +145,7 @@ def _about_smooth_curve(steps: Array, log_stiffness: Array) -> LineNoise:
     degree = min(_SMOOTH_DEGREE, steps.size - 2)
     if degree < 1:
         return LineNoise(np.full((1, 2), ASSUMED[0]), 1, np.empty((0, 2)))
-    values = _parts(log_stiffness)
+    values = _gain_and_phase(log_stiffness)
     basis = np.polynomial.legendre.legvander(to_unit_interval(np.log(steps)), degree)
     residual = np.abs(values - basis @ least_absolute(basis, values, FLOOR**2))
     usual = np.median(np.sort(residual, axis=0)[degree + 1 :], axis=0)  # the curve goes through degree + 1 points
@@ -190,7 +192,7 @@ def _project_out(basis: Array, values: Array) -> Array:
     return np.asarray(turned[basis.shape[1] :])
 
 
-def _parts(values: Array) -> Array:
+def _gain_and_phase(values: Array) -> Array:
     """Split ln K, complex (n,), into ln |K| (gain) and phase [rad], (n, 2)."""
     return np.stack([np.real(values), np.imag(values)], axis=-1)
 

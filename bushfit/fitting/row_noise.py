@@ -159,7 +159,7 @@ def row_noise(residual: Array, settled: Array, cycles: int) -> tuple[RowNoise, f
     fast = between & (number > _SLOW * cycles)
     waves = np.exp(-2j * np.pi / residual.size * np.outer(np.arange(_ORDERS[-1] + 1), number))
     used, power = fast, _periodogram(settled)
-    model = _fitted(power, waves, used)
+    model = _fit_autoregression(power, waves, used)
     slow = between & ~fast
     # a drift less its harmonics leaves a step per cycle
     turn = np.arange(residual.size) * cycles // residual.size - (cycles - 1) / 2.0
@@ -167,7 +167,7 @@ def row_noise(residual: Array, settled: Array, cycles: int) -> tuple[RowNoise, f
     first = int(np.argmax(fast))
     steepest = model.spectrum(waves[:, first : first + 1]) * np.square(first / np.maximum(number, 1))
     if slow.any() and np.mean(whole[slow] / steepest[slow]) < _MOST_SLOW:
-        used, power, model = between, whole, _fitted(whole, waves, between)
+        used, power, model = between, whole, _fit_autoregression(whole, waves, between)
     polynomial, correlations = model
     order, waves = polynomial.size - 1, waves[: polynomial.size, used]
     slopes = np.vstack((np.ones(waves.shape[1]), -2.0 * (waves[1:] / (polynomial @ waves)).real))
@@ -189,7 +189,7 @@ def _periodogram(rows: Array) -> Array:
     return np.maximum(power, np.finfo(float).eps * power.mean())  # of cycles that repeat exactly, rounding
 
 
-def _fitted(power: Array, waves: Array, used: Array) -> _Autoregression:
+def _fit_autoregression(power: Array, waves: Array, used: Array) -> _Autoregression:
     """Fit an autoregressive model to a periodogram, with the order of Schwarz's criterion.
 
     Args:

@@ -47,7 +47,7 @@ class Whitening:
 
     def whiten(self, rows: Array) -> Array:
         """Whiten deviations in units of their scatter, (..., 2 n), by the errors that runs and lines share."""
-        return self._lines.whiten(self.runs.whiten(rows))
+        return self._line_errors.whiten(self.runs.whiten(rows))
 
     def scaled(self, deviation: Array, *, shared: bool = True) -> Array:
         """Scale deviations by the scatter of each point, without whitening.
@@ -81,7 +81,7 @@ class Whitening:
             and (W 1)(W 1)^T. The estimate of t^2 is a mean of `freedom` squares with expectation t^2 + s^2/n; its error
             is limited to t^2. The same applies to errors shared by lines.
         """
-        runs, lines, noise = self.runs, self._lines, self.noise
+        runs, lines, noise = self.runs, self._line_errors, self.noise
         rows, reactions = lines.whiten(influence), {}
         if noise.scatter_freedom:
             reactions["scatter"] = lines.whiten(runs.whiten(runs.whiten(rows))) * np.sqrt(2.0 / noise.scatter_freedom)
@@ -108,7 +108,7 @@ class Whitening:
         return SharedErrors.of_groups(self.run, self.per_scatter, self.noise.shared)
 
     @cached_property
-    def _lines(self) -> SharedErrors:
+    def _line_errors(self) -> SharedErrors:
         """Errors shared by the runs of each line, acting on deviations already whitened by the errors of runs."""
         shrunk = self.per_scatter / np.hypot(1.0, self.runs.deviations)[self._run_of_residual]
         return SharedErrors.of_groups(self.line, shrunk, self.noise.level)

@@ -145,14 +145,14 @@ class Bushing:
     def unit_strain(self, direction: Direction) -> float:
         """Equivalent strain of the rubber per displacement [1/m], or per rotation [1/rad] in torsion."""
         strain = _DEFINITIONS[direction].unit_strain(self.inner_radius, self.outer_radius)
-        return strain * self._corrected(direction).strain
+        return strain * self._correction_factors(direction).strain
 
     def stiffness_per_modulus(self, direction: Direction) -> float:
         """Stiffness of the bushing per equivalent shear modulus of the rubber: [m], or [m^3/rad] in torsion."""
         sizes = self.inner_radius, self.outer_radius, self.length
-        return _DEFINITIONS[direction].stiffness_per_modulus(*sizes) * self._corrected(direction).stiffness
+        return _DEFINITIONS[direction].stiffness_per_modulus(*sizes) * self._correction_factors(direction).stiffness
 
-    def _corrected(self, direction: Direction) -> Correction:
+    def _correction_factors(self, direction: Direction) -> Correction:
         """Correction factors of the formulas of a direction; 1 unless the direction is radial and calibrated."""
         calibrated = direction is Direction.RADIAL and self.shape == "calibrated"
         return self.correction if calibrated and self.correction else NO_CORRECTION

@@ -150,7 +150,7 @@ def _limit(values: Array, ranges: Sequence[Any], count: int) -> Array:
     if low > high * (1 + MARGIN):
         return values
     inside = values[(values >= low * (1 - MARGIN)) & (values <= high * (1 + MARGIN))]  # rigs miss their set points
-    return inside if inside.size > 1 else _even(low, high, count)
+    return inside if inside.size > 1 else _geometric_values(low, high, count)
 
 
 def measured_levels(sweeps: Sequence[Sweep], axis: Literal["frequency", "amplitude"]) -> Array:
@@ -177,11 +177,11 @@ def measured_levels(sweeps: Sequence[Sweep], axis: Literal["frequency", "amplitu
         (free_values if is_free else set_values).append(values)
     spanned = _distinct(np.concatenate(free_values))
     if spanned.size > _MOST_STEPS:
-        spanned = _even(spanned[0], spanned[-1], _MOST_STEPS)
+        spanned = _geometric_values(spanned[0], spanned[-1], _MOST_STEPS)
     return _distinct(np.concatenate([_distinct(np.concatenate(set_values)), spanned]))
 
 
-def _even(low: float, high: float, count: int) -> Array:
+def _geometric_values(low: float, high: float, count: int) -> Array:
     """Make `count` values from `low` to `high` in equal ratios, rounded to three digits; equal values are merged."""
     return _distinct(np.array([float(f"{x:.3g}") for x in np.geomspace(low, high, count)]))
 

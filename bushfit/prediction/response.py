@@ -124,7 +124,7 @@ def time_response(
     )
     models, untimed = timed_candidates(timed, str(place), rig=rig)
     force = envelope([_force(source, model, place, history, conditions) for source, model in models])
-    response = TimeResponse(place, history, force, result.model.unit_strain(place), _tested(result))
+    response = TimeResponse(place, history, force, result.model.unit_strain(place), _tested_strains(result))
     return replace(response, warnings=(*_warnings(result, response, sorted(left_out), temperature), *untimed))
 
 
@@ -150,7 +150,7 @@ def _force(result: Result, model: Model, place: Place, history: History, conditi
         named.force(place, history, kind="loop", conditions=conditions)
     force, slopes = force_and_slopes(named, place, history, errors.covariance.names, conditions)
     if model.unnamed:
-        force = _corrected(force, model, place, history, conditions)
+        force = _corrected_force(force, model, place, history, conditions)
     half = errors.scale.max() * errors.covariance.half_width(slopes)
     if errors.relative.size:
         from scipy.signal import hilbert  # slow to import
@@ -164,7 +164,7 @@ def _force(result: Result, model: Model, place: Place, history: History, conditi
     return Band(force, force - half, force + half)
 
 
-def _corrected(force: Array, model: Model, place: Place, history: History, conditions: RubberConditions) -> Array:
+def _corrected_force(force: Array, model: Model, place: Place, history: History, conditions: RubberConditions) -> Array:
     """Apply the unnamed correction of a model to a force without it.
 
     Args:
@@ -189,7 +189,7 @@ def _corrected(force: Array, model: Model, place: Place, history: History, condi
     return np.fft.irfft(spectrum, samples)[: force.size]
 
 
-def _tested(result: Result) -> tuple[float, float] | None:
+def _tested_strains(result: Result) -> tuple[float, float] | None:
     """Largest strain [1] and strain rate [1/s] of the tests to which a result was fitted; None without tests."""
     if result.measured is None:
         return None

@@ -89,7 +89,7 @@ def combined(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> tuple
     elif isinstance(source, Text) and _is_one_block(source, layout):
         return source, layout
     else:
-        blocks = _stacked(source, layout, vocabulary)
+        blocks = _stacked_blocks(source, layout, vocabulary)
     if len(blocks) < 2:
         return _with_plain_cells(source, layout)
     titles = [block.above[-1].text if block.above else "" for block in blocks]
@@ -172,7 +172,7 @@ def _side_by_side(source: RowSource, layout: Layout, sides: Sequence[slice]) -> 
     return blocks if is_titled or not sides[0].start else []
 
 
-def _stacked(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> list[Segment]:
+def _stacked_blocks(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> list[Segment]:
     """Separate blocks one below the other, each with its header or lines that state a quantity.
 
     The header of a later block may have other names, such as German ones, for the same quantities and units. Rows that

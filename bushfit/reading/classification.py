@@ -78,7 +78,7 @@ def classify(
             rejected.add(role)
             del roles[role]
         else:
-            roles[role] = _preferred(table, roles[role], column)
+            roles[role] = _preferred_column(table, roles[role], column)
     notes = add_half_differences(table, roles, extremes)
     for role in ("amplitude_reached", "acceleration"):
         if role in roles and "amplitude" not in roles:
@@ -87,7 +87,7 @@ def classify(
     notes += by_unit
     if {"displacement", "force"} <= {*roles} and "displacement" not in columns:
         for column in (one for one in unused if moves_along(table, roles["displacement"], one)):
-            _preferred(table, roles["displacement"], replace(column, role="displacement"))
+            _preferred_column(table, roles["displacement"], replace(column, role="displacement"))
     for column in (roles[role] for role in stated_units if role in roles):
         written = parse_unit(split_unit(column.header)[1] or table.layout.units[column.index])[0]
         if written != column.unit and units.is_compatible(written, column.unit or ""):
@@ -144,7 +144,7 @@ def _stated_indices(table: Table, vocabulary: Vocabulary, columns: Mapping[str, 
     return indices
 
 
-def _preferred(table: Table, first: Column, second: Column) -> Column:
+def _preferred_column(table: Table, first: Column, second: Column) -> Column:
     """Choose between two columns for one quantity: frequency in Hz rather than rad/s, else the first of two equal ones.
 
     Args:

@@ -113,7 +113,7 @@ def read_parts(data: bytes, file: Path, recording: Format) -> tuple[Sheet, ...]:
     """
     parts, details = list[Sheet](), dict[str, str]()
     kind = f"{recording.name} file" if recording.name else "workbook"
-    with _silenced():
+    with _silence_libraries():
         try:
             for part in recording.read(data, file):
                 parts += [part] if isinstance(part, Sheet) else _split_by_length(*part, recording)
@@ -138,7 +138,7 @@ def read_parts(data: bytes, file: Path, recording: Format) -> tuple[Sheet, ...]:
 
 
 @contextmanager
-def _silenced() -> Iterator[None]:
+def _silence_libraries() -> Iterator[None]:
     """Context manager that suppresses warnings, logging and printing of libraries and their finalizers."""
     before, hook = logging.root.manager.disable, sys.unraisablehook
     logging.disable(logging.CRITICAL)

@@ -43,7 +43,7 @@ class OpenedFile:
         return MeasurementError(
             f"more than one {kind} holds such a table" if usable else f"no {kind} holds such a table",
             file=self.file,
-            found=_listed([part.sheet or "" for part in usable or self.parts]),
+            found=_quoted_names([part.sheet or "" for part in usable or self.parts]),
             expected="one",
             hint=_ONE_GROUP if kind == "group" and not usable else 'choose it in the campaign: sheet = "..."',
         )
@@ -74,10 +74,10 @@ def open_file(file: Path, file_format: FileFormat) -> OpenedFile:
     if not chosen:
         problem, names = f"there is no such {word_for_part(file)}", [part.sheet for part in parts]
         hint = did_you_mean(name or "", names)
-        raise MeasurementError(problem, file=file, found=f'"{name}"', expected=_listed(names), hint=hint)
+        raise MeasurementError(problem, file=file, found=f'"{name}"', expected=_quoted_names(names), hint=hint)
     return OpenedFile(file, checksum, file_format, chosen)
 
 
-def _listed(names: Sequence[str]) -> str:
+def _quoted_names(names: Sequence[str]) -> str:
     """List at most twelve names as text, in quotation marks and separated by commas."""
     return ", ".join(f'"{name}"' for name in names[:_MOST_LISTED]) + (", ..." if len(names) > _MOST_LISTED else "")

@@ -47,13 +47,13 @@ class Text:
 
     def head(self) -> list[Line]:
         """Return the first non-empty lines of the text, which can contain the header."""
-        return list(islice(_lines(io.BytesIO(self.data[:HEAD_BYTES]), 0), MOST_HEAD_LINES))
+        return list(islice(_non_empty_lines(io.BytesIO(self.data[:HEAD_BYTES]), 0), MOST_HEAD_LINES))
 
     def lines(self, after: int) -> Iterator[Line]:
         """Yield the non-empty lines of the text below the line of the file with number `after`."""
         stream = io.BytesIO(self.data)
         stream.seek(self.offset(after))
-        return _lines(stream, max(after, self.before))
+        return _non_empty_lines(stream, max(after, self.before))
 
     def offset(self, after: int) -> int:
         """Return the index of the first byte after the line of the file with number `after`."""
@@ -128,7 +128,7 @@ class Text:
         return None if has_lost_cells or has_lost_rows else frame
 
 
-def _lines(data: io.BytesIO, after: int) -> Iterator[Line]:
+def _non_empty_lines(data: io.BytesIO, after: int) -> Iterator[Line]:
     """Non-empty lines of a stream whose first line has the number `after` + 1; closes the stream."""
     with io.TextIOWrapper(data, encoding="utf-8", errors="replace") as text:
         for number, line in enumerate(text, start=after + 1):

@@ -192,7 +192,7 @@ def _read_header(text: str, vocabulary: Vocabulary) -> _Meaning:
         return _Meaning(level=text)
     match = _LEVEL.search(whole)
     stepped = _role_of_unit(match["unit"]) if match else None
-    named = _named(text, vocabulary)
+    named = _named_quantity(text, vocabulary)
     if named and units.is_unit(named.unit or named.level_unit or "1"):
         number = _LEVEL.fullmatch(named.unit or named.level_unit or "")
         if not (number and _role_of_unit(number["unit"])):  # "tan delta 1 %" has a level, and no unit of 1 %
@@ -212,13 +212,13 @@ def _read_header(text: str, vocabulary: Vocabulary) -> _Meaning:
     )
     if not rest:
         return level
-    if named := _named(rest, vocabulary):
+    if named := _named_quantity(rest, vocabulary):
         return level | replace(named, convention=convention)
     role = None if stepped else _role_of_unit(unit := rest.strip("[]() "))
     return replace(level, level_unit=unit, stepped=role) if role else _Meaning()
 
 
-def _named(text: str, vocabulary: Vocabulary) -> _Meaning | None:
+def _named_quantity(text: str, vocabulary: Vocabulary) -> _Meaning | None:
     """Meaning of a header of a wide table without a level, such as "K* [N/mm]"; None if it names no known role."""
     heading = vocabulary.heading(text)
     if heading and heading.role in _STEPPED:

@@ -74,7 +74,11 @@ def prepare_displacements(
             _require_cycle(channel)
         if np.abs(ends[:, 0] - ends[:, 1]).sum() < 0.5 * np.abs(ends[:, 2] - ends[:, 1]).sum():
             channels = [replace(channel, displacement=channel.displacement[:-1]) for channel in channels]
-    return [_smoothed(channel, lowpass, steady=steady) for channel in channels] if lowpass is not None else channels
+    return (
+        [_smooth_displacement(channel, lowpass, steady=steady) for channel in channels]
+        if lowpass is not None
+        else channels
+    )
 
 
 def prepare_record(record: Loop, lowpass: float | None = None) -> Loop:
@@ -142,7 +146,7 @@ def _require_cycle(channel: DisplacementHistory) -> None:
         )
 
 
-def _smoothed(channel: DisplacementHistory, frequency: float, *, steady: bool) -> DisplacementHistory:
+def _smooth_displacement(channel: DisplacementHistory, frequency: float, *, steady: bool) -> DisplacementHistory:
     """Filter a displacement by a Butterworth low-pass of fourth order, forward and backward, so without delay.
 
     Args:
