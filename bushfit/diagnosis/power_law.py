@@ -111,26 +111,26 @@ class PowerLaw:
 
     @property
     def sentence(self) -> str:
-        """Text on the power law, such as "more loss, grows as f^0.8, independent of amplitude: acts like a damper"."""
+        """Text on the power law, such as "more loss, grows as f^0.8, independent of amplitude: acts like a damper".
+
+        Phase, powers and unit that the tests leave open are not mentioned.
+        """
         phase, low, high = self.phase_deg
         near = next((text for quarter, text in _QUARTERS.items() if low <= quarter <= high), "")
         turned = np.exp(1j * np.radians(phase))
         stiffness, loss = ("more" if part > 0.0 else "less" for part in (turned.real, turned.imag))
-        parts = [near or f"{stiffness} stiffness and {loss} loss (phase {number(phase, 2)} deg)"]
-        if high - low > 2.0 * _PHASE_WIDTH:
-            parts = ["at a phase that these tests do not determine"]
+        parts = [near or f"{stiffness} stiffness and {loss} loss (phase {number(phase, 2)} deg)"] * self.determined[0]
         powers = ((self.frequency_power, "f", "frequency"), (self.amplitude_power, "X", "amplitude"))
         for determined, ((value, low, high), symbol, axis) in zip(self.determined[1:], powers, strict=True):
-            if not determined:
-                parts.append(f"its change with {axis} is not determined")
-            elif low <= 0.0 <= high:
+            if determined and low <= 0.0 <= high:
                 parts.append(f"independent of {axis}")
-            else:
+            elif determined:
                 parts.append(f"{'grows' if value > 0 else 'falls'} as {symbol}^{number(value, 2)}")
-        if not self.of_one_place:
-            parts.append(" or ".join(_MEASURES[measure] for measure in (self.measure, *self.alternatives)))
+        measures = (self.measure, *self.alternatives)
+        if not self.of_one_place and len(measures) < len(_MEASURES):
+            parts.append(" or ".join(_MEASURES[measure] for measure in measures))
         like = self._known_law() if all(self.determined) else ""
-        return ", ".join(parts) + (f": acts like {like}" if like else "")
+        return ", ".join(parts or ["these tests do not determine its form"]) + (f": acts like {like}" if like else "")
 
     def _known_law(self) -> str:
         """Name of the element (spring, damper, ...) with nearly the phase and powers of this law; "" without one."""
