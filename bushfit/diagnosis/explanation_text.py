@@ -49,8 +49,12 @@ def causes_text(candidates: Sequence[Composition], finding: Finding) -> list[str
     claims = {c.best.claim.key if c.best.claim else None: c.best.claim for c in finding.reported}
     if all(claims.values()):
         return [f"check first whether {' or whether '.join(claim.sentence for claim in claims.values() if claim)}"]
-    names = [f"{candidate.label} ({format_probability(candidate.probability)})" for candidate in candidates]
-    sentences = [f"the cause may be {' or '.join(names)}"] if names else []
+    names = [
+        f"{candidate.best.claim.sentence if candidate.best.claim else candidate.label} "
+        f"({format_probability(candidate.probability)})"
+        for candidate in candidates
+    ]
+    sentences = [f"possible cause: {' or '.join(names)}"] if names else []
     leads = [name for name in finding.leads if not any(name in candidate.causes for candidate in candidates)]
     sentences += [f"leads: {' and '.join(leads)}"] if leads else []
     return sentences or ["no known effect explains the gap"]

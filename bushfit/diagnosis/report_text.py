@@ -45,6 +45,8 @@ _ONE_DIRECTION = (
     "one direction was tested: a deviation of the compound and a smooth fault of the rig cannot be distinguished; test "
     "another direction or specimen"
 )
+#: Probability above which the next step is to correct the record: such a mistake is more probable than not.
+_LIKELY = 0.5
 #: Advice if levels disagree by more than the class of the rig.
 _LEVELS_ADVICE = "measure the levels again in another session, or state the class of the rig (gain_error under [rig])"
 
@@ -269,7 +271,7 @@ class DiagnosisWriter:
         Args:
             leader: most probable explanation with causes.
         """
-        if claim := leader.best.claim:
+        if (claim := leader.best.claim) and leader.probability > _LIKELY:
             return f"check the records of the tests; {'; '.join(claim.corrections)}"
         fitted = [c for c in self.finding.reported if c.best.effects and c.best.refitted]
         models, odds = [c.best.state.fit.model for c in fitted], [c.probability for c in fitted]
@@ -395,5 +397,5 @@ def _format_amount(name: str, result: Result) -> str:
     value, interval = result.model.values[parameter], result.interval(parameter)
     unit, factor = display_unit(amount.unit, 1.0, value)
     value_text, *ends = format_aligned([factor * x for x in (value, *(interval or ()))], 3)
-    text = f"{amount.meaning or amount.name}: {f'{value_text} {unit}'.removesuffix(' -').removesuffix(' 1')}"
+    text = f"{amount.meaning.partition(" (")[0] or amount.name}: {f'{value_text} {unit}'.removesuffix(' -').removesuffix(' 1')}"
     return f"{text} (95 % interval {ends[0]} to {ends[1]})" if ends else text

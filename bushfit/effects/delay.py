@@ -9,7 +9,7 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
     """Complex stiffness with a delay between force and displacement.
 
     Args:
-        p: parameter values by name: tau [s], delay of the force; negative for a delay of the displacement.
+        p: parameter values by name: tau [s], delay of the force (if negative, of the displacement).
         below: complex stiffness K without this effect, as a function of omega and amplitude.
         omega, amplitude: angular frequency [rad/s] and displacement amplitude X [m or rad], (..., n).
         setting: the test: bushing, direction and kind (sweep or loop).
@@ -30,7 +30,7 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
     """Force with a delay between force and displacement.
 
     Args:
-        p: parameter values by name: tau [s], delay of the force; negative for a delay of the displacement.
+        p: parameter values by name: tau [s], delay of the force (if negative, of the displacement).
         below: force F without this effect, as a function of the displacement history.
         history: displacement over time [m or rad], (..., n).
         setting: the test: bushing, direction and kind (sweep or loop).
