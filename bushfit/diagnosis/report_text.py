@@ -397,5 +397,6 @@ def _format_amount(name: str, result: Result) -> str:
     value, interval = result.model.values[parameter], result.interval(parameter)
     unit, factor = display_unit(amount.unit, 1.0, value)
     value_text, *ends = format_aligned([factor * x for x in (value, *(interval or ()))], 3)
-    text = f"{amount.meaning.partition(" (")[0] or amount.name}: {f'{value_text} {unit}'.removesuffix(' -').removesuffix(' 1')}"
+    quantity, _, _ = (amount.meaning or amount.name).partition(" (")
+    text = f"{quantity}: {f'{value_text} {unit}'.removesuffix(' -').removesuffix(' 1')}"
     return f"{text} (95 % interval {ends[0]} to {ends[1]})" if ends else text
