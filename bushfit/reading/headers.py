@@ -52,12 +52,12 @@ ALL_COLUMNS = {
 }
 #: Roles with a common property, in a fixed order, by property (see words.toml).
 ROLE_SETS = {kind: dict.fromkeys(roles).keys() for kind, roles in WORDS["role_sets"].items()}
-#: Names of columns that assign rows to tests, by what they contain: direction, specimen_number or run.
+#: Names of columns that assign rows to tests, by what they contain: direction, specimen_number, run or preload.
 ROW_COLUMNS = {
     **WORDS["rows"],
     "specimen_number": WORDS["above"]["specimen_number"],
     "run": [*SWEEP_COLUMNS["repeat"], "block"],
-    "condition": [*SWEEP_COLUMNS["preload"], *SWEEP_COLUMNS["temperature"]],
+    "preload": SWEEP_COLUMNS["preload"],
 }
 #: Convention by which an amplitude is stated.
 AmplitudeConvention = Literal["zero-to-peak", "peak-to-peak", "rms"]
@@ -259,7 +259,7 @@ class Vocabulary:
                 continue  # the unit without a bracket
             bare, without_asides = plain(name), plain(_ASIDES.sub("", _folded(name)))
             implied: AmplitudeConvention | None = "peak-to-peak" if bare in PEAK_TO_PEAK_NAMES else convention
-            amplitudes = [word + "amplitude" for word in (bare, without_asides) if implied or extreme]
+            amplitudes = [word + "amplitude" for word in (bare, without_asides) if implied or (extreme and word)]
             amplitudes += ["amplitude"] * (bare in PEAK_TO_PEAK_NAMES)
             without_mean = plain(_MEANS.sub("", _folded(name)))
             for word in (

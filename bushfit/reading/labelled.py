@@ -119,7 +119,7 @@ def find_labels(table: Table) -> Mapping[str, tuple[int, Sequence[str]]]:
     for index, header in enumerate(table.headers):
         heading = _LABELS.heading(header) if header else None
         role, is_loop = heading.role if heading else "", {"time", "displacement"} <= set(table.roles)
-        if role == "condition":  # of a loop: a run if the time begins anew
+        if role == "preload":  # of loops, which are runs if the time begins anew
             role = "run" if is_loop else ""
         if role in ("", *labels) or (header == "block" and "displacement" not in table.roles):
             continue
