@@ -105,10 +105,10 @@ def command(model: Path, formats: tuple[str, ...], campaign: Path | None, output
     source = model_source(file)
     settings |= {"dialect": dialect or "nastran", "decimal_comma": comma}
     grid: Any = {key: settings.pop(key) for key in GridOptions.__annotations__}
-    exported = export(result, source, names, loaded, grid, **settings)
+    document, files = export(result, source, names, loaded, grid, **settings)
     limits = dict[str, list[str]]()
-    for name, of_format in exported.exported.items():
-        for omission in of_format.omissions:
+    for name, entry in document["formats"].items():
+        for omission in entry["left_out"]:
             limits.setdefault(omission, []).append(name)
     printed = [*limits] if output.verbose else [limit for limit in limits if "error" in limit]
     for limit in printed:
@@ -117,5 +117,5 @@ def command(model: Path, formats: tuple[str, ...], campaign: Path | None, output
         output.print(
             f"{remaining} more limit{'s' * (remaining > 1)} of the formats: -v prints all; the files state them"
         )
-    output.warn(exported.predicted.warnings)
-    output.write(folder, exported.files, exported.document, input_files(loaded, file))
+    output.warn(document["warnings"])
+    output.write(folder, files, document, input_files(loaded, file))

@@ -17,9 +17,9 @@ from bushfit.errors import error_location
 from bushfit.units import display_unit, number
 
 if TYPE_CHECKING:
-    from bushfit.commands.plan import PlanOutput
     from bushfit.planning.contract import Aim
     from bushfit.planning.document import PlanFile
+    from bushfit.planning.plan import Plan
 
 #: Maximum of --hours; larger values are typing errors.
 _MOST_HOURS = 2000.0
@@ -90,7 +90,7 @@ def command(source: Path, campaign: Path | None, aim: Aim | None, output: Output
     """
     from bushfit.campaign.campaign import Campaign, load_campaign
     from bushfit.commands.loading import load_source
-    from bushfit.commands.plan import plan
+    from bushfit.commands.plan import plan, plan_files
 
     parameters, rivals, targets = settings["parameters"], settings["rivals"], dict(settings.pop("targets"))
     if aim not in (None, "rivals") and rivals:
@@ -105,26 +105,26 @@ def command(source: Path, campaign: Path | None, aim: Aim | None, output: Output
         raise click.UsageError("'--campaign' requires MODEL.json.")
     folder = output.folder(opened.name, "plan.json")
     with error_location(source):
-        outcome = plan(opened, settings_campaign, aim=aim or implied, targets=targets, **settings)
-    _print_plan(output, outcome)
-    output.write(folder, outcome.files, outcome.document, [source, *([campaign] if campaign else [])])
-    if outcome.plan.tests:
+        planned = plan(opened, settings_campaign, aim=aim or implied, targets=targets, **settings)
+    _print_plan(output, planned)
+    output.write(folder, plan_files(planned), planned.document, [source, *([campaign] if campaign else [])])
+    if planned.tests:
         output.print(f"next: make the tests in the order of {folder / output.formats.table('plan')}")
-    if missed := [name for name, target in outcome.document["targets"].items() if not target["met"]]:
+    if missed := [name for name, target in planned.document["targets"].items() if not target["met"]]:
         click.echo(f"bushfit: these targets are not met: {', '.join(missed)}", err=True)
         click.get_current_context().exit(1)
 
 
-def _print_plan(output: Output, outcome: PlanOutput) -> None:
+def _print_plan(output: Output, plan: Plan) -> None:
     """Print the planned tests, their expected errors compared with the standard programme, and the warnings."""
-    document = outcome.document
+    document = plan.document
     hours = number(document["hours_planned"], 3)
     gains = (
         f"{place} from {number(100.0 * row['before'], 2)} to {number(100.0 * row['planned'], 2)} %"
         for place, row in document["stiffness"].items()
     )
     runs = f"{len(document['tests'])} runs in {hours} h"
-    misses = outcome.plan.knowledge.result.model_error is not None
+    misses = plan.knowledge.result.model_error is not None
     condition, included = (", if the model were right", ", model error included") if misses else ("", "")
     if rivals := document["rivals"]:
         chi_square, standard = (number(rivals[key], 3) for key in ("planned", "standard"))
@@ -135,7 +135,7 @@ def _print_plan(output: Output, outcome: PlanOutput) -> None:
     else:
         output.print(f"{runs} reduce the standard error of the stiffness{included}: {', '.join(gains)}")
     output.print(f"starting point: {document['source']}")
-    _print_tests(output, outcome)
+    _print_tests(output, plan)
     standard = f"standard, {number(document['hours_standard'], 3)} h"
     error_columns = ("quantity", "before", f"plan, {number(document['hours_planned'], 3)} h", standard)
     rows = {f"{name}{condition}": row for name, row in document["parameters"].items()}
@@ -162,14 +162,14 @@ def _print_plan(output: Output, outcome: PlanOutput) -> None:
     output.warn(document["warnings"])
 
 
-def _print_tests(output: Output, outcome: PlanOutput) -> None:
+def _print_tests(output: Output, plan: Plan) -> None:
     """Print a table of the planned tests with the number of runs of each."""
     import numpy as np
 
     from bushfit.campaign.simulated import SimulatedLoop
     from bushfit.planning.contract import operating_points
 
-    tests, rows = outcome.plan.tests, []
+    tests, rows = plan.tests, []
     for test, runs in Counter(tests).items():
         unit, factor = test.direction.display.displacement
         rates, sizes = (np.unique(axis).tolist() for axis in operating_points(test))

@@ -1,8 +1,7 @@
 """export: convert a fitted model to the files of other programs."""
 
 import importlib
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from functools import partial
 from typing import Any
@@ -12,7 +11,6 @@ from typing_extensions import TypedDict
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.commands.predict import GridOptions, predict
-from bushfit.commands.predicted import PredictionOutput
 from bushfit.export.contract import Exported, ExportRequest
 from bushfit.model.result import Result
 from bushfit.progress import track
@@ -56,26 +54,9 @@ class ExportDocument(TypedDict):
     warnings: list[str]
 
 
-@dataclass(frozen=True, eq=False)
-class ExportOutput:
-    """Output of the command export: predictions, exported files and their limitations.
-
-    Args:
-        predicted: prediction over the exported grid.
-        exported: files and limitations of each format, by its name.
-        document: content of `export --json`.
-        files: files of all formats, and table of the Maxwell arms.
-    """
-
-    predicted: PredictionOutput
-    exported: Mapping[str, Exported]
-    document: ExportDocument
-    files: Sequence[ResultFile]
-
-
 def export(
     result: Result, source: Source, names: Sequence[str], campaign: Campaign | None, grid: GridOptions, **settings: Any
-) -> ExportOutput:
+) -> tuple[ExportDocument, list[ResultFile]]:
     """Convert a fitted model to files for other programs.
 
     Args:
@@ -87,7 +68,7 @@ def export(
         settings: settings of `ExportRequest`, such as `accuracy`, `units` and `temperature`.
 
     Returns:
-        Predictions, the content for each format with its omissions, and the result files.
+        Content of `export --json`, with the omissions of each format; and the result files.
 
     Raises:
         ModelError: a model that a format cannot represent, or an invalid grid.
@@ -116,4 +97,4 @@ def export(
     if arms := tuple(part for written in exported.values() for part in written.arms):
         places = [prediction.direction for prediction in predicted.predictions]
         files.append(ResultFile("arms", "table", partial(arms_table, result.model, arms, places)))
-    return ExportOutput(replace(predicted, arms=arms), exported, document, files)
+    return document, files

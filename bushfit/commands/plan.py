@@ -2,7 +2,6 @@
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 from typing import Unpack
 
@@ -21,7 +20,6 @@ from bushfit.model.result import Result
 from bushfit.planning.campaign import campaign_toml
 from bushfit.planning.compound import guess_parameters
 from bushfit.planning.contract import Aim, Knowledge, PlanRequest, PredictionGrid, Test, operating_points
-from bushfit.planning.document import PlanFile
 from bushfit.planning.knowledge import from_campaign, from_result, with_rig_class
 from bushfit.planning.plan import Plan
 from bushfit.planning.plan import plan as choose_tests
@@ -40,21 +38,6 @@ _COLUMNS = (
 )
 
 
-@dataclass(frozen=True, eq=False)
-class PlanOutput:
-    """Output of the command plan: planned tests with their expected results, and result files.
-
-    Args:
-        plan: planned tests.
-        document: content of plan.json: planned tests and their expected results.
-        files: document and table of tests; and a campaign file, if the plan has tests.
-    """
-
-    plan: Plan
-    document: PlanFile
-    files: Sequence[ResultFile]
-
-
 def plan(
     source: Campaign | Result | Knowledge,
     campaign: Campaign | None = None,
@@ -66,7 +49,7 @@ def plan(
     rivals: Sequence[str] = (),
     targets: Mapping[str, float] | None = None,
     **grid: Unpack[GridOptions],
-) -> PlanOutput:
+) -> Plan:
     """Choose the next tests of a campaign, of a fitted model, or of a compound that was not tested yet.
 
     Args:
@@ -82,7 +65,7 @@ def plan(
         grid: directions, frequencies and amplitudes of the wanted predictions, as of `predict`.
 
     Returns:
-        Tests in their order with their expected results, and the result files.
+        Tests in their order with their expected results.
 
     Raises:
         CampaignError: the campaign has no tests, no compound and no model.
@@ -110,11 +93,15 @@ def plan(
         for target in _targets(name, knowledge, grids):
             wanted[target] = min(half_width, wanted.get(target, half_width))
     request = PlanRequest(aim, hours, rig, places, grids, tuple(parameters) or knowledge.names, wanted)
-    chosen = choose_tests(knowledge, request)
-    files = [ResultFile("plan", "json", chosen.document), ResultFile("plan", "table", partial(plan_sheet, chosen))]
-    if chosen.tests:
-        files.append(ResultFile(CAMPAIGN_FILE, "raw", campaign_toml(knowledge, chosen.tests).encode()))
-    return PlanOutput(chosen, chosen.document, files)
+    return choose_tests(knowledge, request)
+
+
+def plan_files(plan: Plan) -> list[ResultFile]:
+    """Result files of a plan: document, sheet of tests for the operator and, if it has tests, a campaign file."""
+    files = [ResultFile("plan", "json", plan.document), ResultFile("plan", "table", partial(plan_sheet, plan))]
+    if plan.tests:
+        files.append(ResultFile(CAMPAIGN_FILE, "raw", campaign_toml(plan.knowledge, plan.tests).encode()))
+    return files
 
 
 def _knowledge(source: Campaign | Result | Knowledge, rivals: Sequence[str] | None) -> Knowledge:

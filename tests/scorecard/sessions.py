@@ -84,7 +84,7 @@ def planned_session(campaign: Campaign, hours: float) -> tuple[Test, ...]:
     except ModelError:  # rivals of which the fit of either is no model: no test is planned for them
         return ()
     rivals = planned.document["rivals"]
-    return planned.plan.tests if rivals and rivals["planned"] >= RIVALS_APART else ()
+    return planned.tests if rivals and rivals["planned"] >= RIVALS_APART else ()
 
 
 def with_session(campaign: Campaign, hidden: Simulated, tests: tuple[Test, ...]) -> Campaign:
