@@ -7,7 +7,6 @@ from string import ascii_uppercase
 from typing import Any, Unpack
 
 from bushfit.campaign.campaign import Campaign
-from bushfit.campaign.schema import PredictSettings
 from bushfit.commands.families import COMPOUND, family_to_use, fit_campaign_families
 from bushfit.commands.fit import fit
 from bushfit.commands.loading import HasResult, as_result
@@ -121,22 +120,60 @@ def compare(
         BushfitError: too few or too many results, or directions and points that one of them cannot predict.
     """
     settings, directions = requested_settings(grid), grid.get("directions") or ()
+    fitted, notes = list[FittedFamily](), list[str]()
     if families is not None and isinstance(reference, Campaign) and not others:
         fitted, results, notes = fit_campaign_families(reference, families, directions or None)
-        origin = str(reference.path), reference.sweeps, reference.sha256
-        entries = [
-            ComparedResult(family.name, origin[0], result, *origin[1:])
-            for family, result in zip(fitted, results, strict=True)
-        ]
-        return _compared(entries, settings, families=fitted, notes=notes, preload=preload, command=command)
-    if families is not None or not 1 <= len(others) < MOST:
+        path, sweeps, sha256 = str(reference.path), reference.sweeps, reference.sha256
+        family_results = zip(fitted, results, strict=True)
+        entries = [ComparedResult(family.name, path, result, sweeps, sha256) for family, result in family_results]
+    elif families is None and 1 <= len(others) < MOST:
+        entries = [compared_result(source, directions=directions) for source in (reference, *others)]
+    else:
         raise BushfitError(
             "this cannot be compared",
             found=f"{1 + len(others)} results{' and families' if families is not None else ''}",
             expected=f"2 to {MOST} results, or one campaign and families",
         )
-    entries = [compared_result(source, directions=directions) for source in (reference, *others)]
-    return _compared(entries, settings, preload=preload, command=command)
+    results, labels = [entry.result for entry in entries], list(ascii_uppercase[: len(entries)])
+    columns, grids = _common_places(results, settings.directions), []
+    for places in columns:
+        if len({place.motion for place in places}) > 1:
+            found = ", ".join(f"{place}: {place.motion.words[0]}" for place in places)
+            raise ModelError("the results have different kinds of motion", found=found, expected="one kind of motion")
+        grids.append(requested_grid(common_grid(results, places, entries[0].sweeps), settings, places[0]))
+    preloads = [requested_preloads(results[0], places[0], [preload])[0] if preload else None for places in columns]
+    comparisons = with_holm(
+        [
+            compare_two(results[0], result, [(places[0], places[index]) for places in columns], grids, preloads)
+            for index, result in enumerate(results[1:], start=1)
+        ]
+    )
+    others_compared = list(zip(labels[1:], comparisons, strict=True))
+    words = [f"{label} against A, {line}" for label, comparison in others_compared for line in comparison.sentences()]
+    advice = [family_to_use(fitted, results)] if fitted else []
+    advice += [f"{label}, {family.name}: {family.words}" for label, family in zip(labels[1:], fitted[1:], strict=False)]
+    warnings = [*notes, *_warnings(labels, entries, comparisons, are_families=bool(fitted))]
+    compared = ComparisonFile(
+        SCHEMA,
+        [_entry(label, entry) for label, entry in zip(labels, entries, strict=True)],
+        [_pair(label, comparison) for label, comparison in others_compared],
+        [_family(*row) for row in zip(labels, fitted, results, strict=False)] or None,
+        [*advice, *words],
+        warnings,
+        command,
+        {"bushfit": __version__, **versions()},
+    )
+    document = to_json_data(compared, ComparisonFile)
+    figure = ResultFile("compare", "figure", lambda: plots.comparison.comparison_figure(compared))
+    files = [
+        ResultFile("compare", "json", document),
+        figure,
+        ResultFile("parameters", "table", partial(parameter_differences_table, compared)),
+        *([ResultFile("families", "table", partial(families_table, compared.families))] if compared.families else []),
+        ResultFile("differences", "table", partial(differences_table, compared)),
+        ResultFile("compare", "page", partial(comparison_page, compared, figure)),
+    ]
+    return ComparisonOutput(comparisons, advice, words, notes, warnings, compared, document, files)
 
 
 def compared_result(
@@ -160,69 +197,6 @@ def compared_result(
         return ComparedResult(source.name, name or str(source.path), result, source.sweeps, source.sha256)
     result = as_result(source)
     return ComparedResult(result.name, name or result.name, result, sha256=sha256)
-
-
-def _compared(
-    entries: Sequence[ComparedResult],
-    grid: PredictSettings,
-    *,
-    families: Sequence[FittedFamily] = (),
-    notes: Sequence[str] = (),
-    preload: str | None = None,
-    command: str = "",
-) -> ComparisonOutput:
-    """Compare each result with the first, in the directions and at the operating points of a grid.
-
-    Args:
-        entries: compared results, the reference first.
-        grid: directions, frequencies and amplitudes; None for the default of an axis.
-        families: model families to which the entries belong; empty for other results.
-        notes: further warnings.
-        preload: preload with its unit; None for the tested preload nearest to zero.
-        command: command line for the document.
-    """
-    results, labels = [entry.result for entry in entries], list(ascii_uppercase[: len(entries)])
-    columns, grids = _common_places(results, grid.directions), []
-    for places in columns:
-        if len({place.motion for place in places}) > 1:
-            found = ", ".join(f"{place}: {place.motion.words[0]}" for place in places)
-            raise ModelError("the results have different kinds of motion", found=found, expected="one kind of motion")
-        grids.append(requested_grid(common_grid(results, places, entries[0].sweeps), grid, places[0]))
-    preloads = [requested_preloads(results[0], places[0], [preload])[0] if preload else None for places in columns]
-    comparisons = with_holm(
-        [
-            compare_two(results[0], result, [(places[0], places[index]) for places in columns], grids, preloads)
-            for index, result in enumerate(results[1:], start=1)
-        ]
-    )
-    pairs = list(zip(labels[1:], comparisons, strict=True))
-    words = [f"{label} against A, {line}" for label, comparison in pairs for line in comparison.sentences()]
-    advice = [family_to_use(families, results)] if families else []
-    advice += [
-        f"{label}, {family.name}: {family.words}" for label, family in zip(labels[1:], families[1:], strict=False)
-    ]
-    warnings = [*notes, *_warnings(labels, entries, comparisons, are_families=bool(families))]
-    compared = ComparisonFile(
-        SCHEMA,
-        [_entry(label, entry) for label, entry in zip(labels, entries, strict=True)],
-        [_pair(label, comparison) for label, comparison in pairs],
-        [_family(*row) for row in zip(labels, families, results, strict=False)] or None,
-        [*advice, *words],
-        warnings,
-        command,
-        {"bushfit": __version__, **versions()},
-    )
-    document = to_json_data(compared, ComparisonFile)
-    figure = ResultFile("compare", "figure", lambda: plots.comparison.comparison_figure(compared))
-    files = [
-        ResultFile("compare", "json", document),
-        figure,
-        ResultFile("parameters", "table", partial(parameter_differences_table, compared)),
-        *([ResultFile("families", "table", partial(families_table, compared.families))] if compared.families else []),
-        ResultFile("differences", "table", partial(differences_table, compared)),
-        ResultFile("compare", "page", partial(comparison_page, compared, figure)),
-    ]
-    return ComparisonOutput(comparisons, advice, words, notes, warnings, compared, document, files)
 
 
 def _warnings(

@@ -88,9 +88,14 @@ def plan(
         for place in wanted_places or default
     )
     rig = with_rig_class(campaign.rig if campaign else RigSettings(), knowledge.noise)
-    wanted = dict[str, float]()
+    wanted, possible = dict[str, float](), {name: [name] for name in knowledge.names}
+    for quantity in PREDICTED:
+        predictions = [f"{quantity}.{grid.place}" for grid in grids]
+        possible |= {quantity: predictions, **{prediction: [prediction] for prediction in predictions}}
     for name, half_width in (targets or {}).items():
-        for target in _targets(name, knowledge, grids):
+        if name not in possible:
+            raise unknown_name("there is no such target", name, possible, ModelError, "--target")
+        for target in possible[name]:
             wanted[target] = min(half_width, wanted.get(target, half_width))
     request = PlanRequest(aim, hours, rig, places, grids, tuple(parameters) or knowledge.names, wanted)
     return choose_tests(knowledge, request)
@@ -120,23 +125,6 @@ def _knowledge(source: Campaign | Result | Knowledge, rivals: Sequence[str] | No
     if source.bushing and source.compound:
         return guess_parameters(source.bushing, source.compound)
     return from_result(Result(model_of(source), specimens=source.specimens))
-
-
-def _targets(name: str, knowledge: Knowledge, grids: Sequence[PredictionGrid]) -> list[str]:
-    """List the quantities that a target names: "mu", "stiffness" (all directions) or "stiffness.axial".
-
-    Args:
-        name: name of a parameter or prediction, with or without a direction.
-        knowledge: knowledge before the tests, with the names of the parameters.
-        grids: operating points of the predictions.
-    """
-    possible = {parameter: [parameter] for parameter in knowledge.names}
-    for quantity in PREDICTED:
-        predictions = [f"{quantity}.{grid.place}" for grid in grids]
-        possible |= {quantity: predictions, **{prediction: [prediction] for prediction in predictions}}
-    if name not in possible:
-        raise unknown_name("there is no such target", name, possible, ModelError, "--target")
-    return possible[name]
 
 
 def plan_sheet(plan: Plan) -> pd.DataFrame:
