@@ -86,13 +86,13 @@ def _print_comparison(output: Output, name: str, compared: ComparisonOutput) -> 
     """Print which results differ by more than chance, the next step, the sources of the results, and tables."""
     from bushfit.report.compared import FAMILY_HEADS, family_cells, format_p_value, parameter_cells
 
-    entries, families = compared.compared.compared, compared.compared.families
-    first, *labels = compared.compared.names
+    content, families = compared.content, compared.content.families
+    first, *labels = content.names
     if families:
         verdict, *advice = compared.advice
         best = max(families, key=lambda family: family.probability)
         effects = "" if best is families[0] else "".join(f" --effect {name}" for name in best.name.split("+"))
-        action = f"next: bushfit fit {quote_path(Path(entries[0].source))}{effects}"
+        action = f"next: bushfit fit {quote_path(Path(content.compared[0].source))}{effects}"
         sentences = [*advice, *compared.notes, *(compared.words if output.verbose else ())]
     else:
         different = []
@@ -108,7 +108,7 @@ def _print_comparison(output: Output, name: str, compared: ComparisonOutput) -> 
     output.print_headline(name, verdict, action)
     for sentence in sentences:
         output.print(sentence)
-    for entry in entries:
+    for entry in content.compared:
         output.print(f"{entry.label}: {entry.name} ({entry.source})")
     detailed = compared.comparisons if output.verbose or not families else ()
     for label, comparison in zip(labels, detailed, strict=False):
@@ -120,5 +120,5 @@ def _print_comparison(output: Output, name: str, compared: ComparisonOutput) -> 
             output.print(f"all {count} together, with correlations: p {format_p_value(p)}")
     if families:
         title = "families; held out: root mean square in units of noise (1: noise alone)"
-        output.print_table(title, FAMILY_HEADS, family_cells(compared.compared))
+        output.print_table(title, FAMILY_HEADS, family_cells(content))
     output.warn(line for line in compared.warnings if line not in compared.notes)

@@ -76,7 +76,7 @@ class ComparisonOutput:
         words: sentences on the differences, one for each result and direction.
         notes: warnings on the families.
         warnings: all warnings without repetition, each with the letters of the results that it concerns.
-        compared: content of compare.json.
+        content: content of compare.json.
         document: the same as JSON data.
         files: document, tables, figure and page.
     """
@@ -86,12 +86,12 @@ class ComparisonOutput:
     words: Sequence[str]
     notes: Sequence[str]
     warnings: Sequence[str]
-    compared: ComparisonFile
+    content: ComparisonFile
     document: Mapping[str, Any]
     files: Sequence[ResultFile]
 
     def __repr__(self) -> str:
-        return f"Comparison of {', '.join(entry.name for entry in self.compared.compared)}"
+        return f"Comparison of {', '.join(entry.name for entry in self.content.compared)}"
 
 
 def compare(
@@ -153,7 +153,7 @@ def compare(
     advice = [family_to_use(fitted, results)] if fitted else []
     advice += [f"{label}, {family.name}: {family.words}" for label, family in zip(labels[1:], fitted[1:], strict=False)]
     warnings = [*notes, *_warnings(labels, entries, comparisons, are_families=bool(fitted))]
-    compared = ComparisonFile(
+    content = ComparisonFile(
         SCHEMA,
         [_entry(label, entry) for label, entry in zip(labels, entries, strict=True)],
         [_pair(label, comparison) for label, comparison in others_compared],
@@ -163,17 +163,17 @@ def compare(
         command,
         {"bushfit": __version__, **versions()},
     )
-    document = to_json_data(compared, ComparisonFile)
-    figure = ResultFile("compare", "figure", lambda: plots.comparison.comparison_figure(compared))
+    document = to_json_data(content, ComparisonFile)
+    figure = ResultFile("compare", "figure", lambda: plots.comparison.comparison_figure(content))
     files = [
         ResultFile("compare", "json", document),
         figure,
-        ResultFile("parameters", "table", partial(parameter_differences_table, compared)),
-        *([ResultFile("families", "table", partial(families_table, compared.families))] if compared.families else []),
-        ResultFile("differences", "table", partial(differences_table, compared)),
-        ResultFile("compare", "page", partial(comparison_page, compared, figure)),
+        ResultFile("parameters", "table", partial(parameter_differences_table, content)),
+        *([ResultFile("families", "table", partial(families_table, content.families))] if content.families else []),
+        ResultFile("differences", "table", partial(differences_table, content)),
+        ResultFile("compare", "page", partial(comparison_page, content, figure)),
     ]
-    return ComparisonOutput(comparisons, advice, words, notes, warnings, compared, document, files)
+    return ComparisonOutput(comparisons, advice, words, notes, warnings, content, document, files)
 
 
 def compared_result(
