@@ -21,7 +21,7 @@ def command(output: Output) -> None:
     from bushfit.errors import quote_path
 
     campaign = load_campaign(Path(simulation.__file__).with_name("example.toml"))
-    simulated = simulate_campaign(*simulated_tests(campaign), output.formats.table_form)
+    _, document, files = simulate_campaign(*simulated_tests(campaign), output.formats.table_form)
     folder = output.output or Path("bushfit-example")
-    output.write(folder, simulated.files, simulated.document)
+    output.write(folder, files, document)
     output.print(f"next: bushfit run {quote_path(folder / 'campaign.toml')}")

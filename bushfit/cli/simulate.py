@@ -61,11 +61,11 @@ def command(source: Path, effects: tuple[str, ...], output: Output, **settings: 
     for text in effects:
         truth = _with_effect(truth, text)
     with error_location(source):
-        simulated = simulate_campaign(truth, replace(tests, **changes), output.formats.table_form)
-    output.warn(simulated.warnings)
-    output.print(simulated.simulated.truth.equation())
-    folder = output.folder(simulated.simulated.result.name)
-    output.write(folder, simulated.files, simulated.document, [source])
+        result, document, files = simulate_campaign(truth, replace(tests, **changes), output.formats.table_form)
+    if truth.unnamed:
+        output.warn(["the unnamed correction is left out, because it applies only to steady states, not in time"])
+    output.print(result.model.equation())
+    output.write(output.folder(result.name), files, document, [source])
 
 
 def _with_effect(model: Model, text: str) -> Model:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,28 +16,12 @@ from bushfit.model.result import Result
 from bushfit.reading.tablefile import Form
 from bushfit.report.results import ResultFile, write_results
 from bushfit.simulation.files import to_files
-from bushfit.simulation.measured import Simulated
 from bushfit.simulation.measured import simulate as simulate_tests
 
 
-@dataclass(frozen=True, eq=False)
-class SimulationOutput:
-    """Output of the command simulate: simulated tests, and the files of the campaign.
-
-    Args:
-        simulated: the simulated tests and the true model.
-        document: content of `simulate --json`: the true model and the names of the files.
-        files: campaign file, tables, and truth.json.
-        warnings: sentences on parts of the model that the simulation leaves out.
-    """
-
-    simulated: Simulated
-    document: Mapping[str, Any]
-    files: Sequence[ResultFile]
-    warnings: Sequence[str] = ()
-
-
-def simulate_campaign(truth: Model, settings: SimulateSettings, form: Form = "csv") -> SimulationOutput:
+def simulate_campaign(
+    truth: Model, settings: SimulateSettings, form: Form = "csv"
+) -> tuple[Result, dict[str, Any], list[ResultFile]]:
     """Simulate the tests of a campaign.
 
     Args:
@@ -47,17 +30,12 @@ def simulate_campaign(truth: Model, settings: SimulateSettings, form: Form = "cs
         form: format of the tables.
 
     Returns:
-        Simulated tests, the files of the campaign, and warnings.
+        The model that was simulated; content of `simulate --json`; and campaign file, tables and truth.json.
     """
-    warnings = []
-    if truth.unnamed:
-        warnings.append("the unnamed correction is left out, because it applies only to steady states, not in time")
-        truth = truth.without(UNNAMED)
-    simulated = simulate_tests(truth, settings)
+    simulated = simulate_tests(truth.without(UNNAMED), settings)
     contents = to_files(simulated, form)
     document = {"truth": to_document(simulated.result), "files": sorted(contents)}
-    files = [ResultFile(name, "raw", content) for name, content in contents.items()]
-    return SimulationOutput(simulated, document, files, warnings)
+    return simulated.result, document, [ResultFile(name, "raw", content) for name, content in contents.items()]
 
 
 def simulated_tests(source: Model | Result | HasResult | Campaign) -> tuple[Model, SimulateSettings]:
@@ -86,7 +64,7 @@ def simulate(
         BushfitError: the source has no model, or files would be replaced.
     """
     truth, tests = simulated_tests(source)
-    output = simulate_campaign(truth, replace(tests, **settings))
+    _, _, files = simulate_campaign(truth, replace(tests, **settings))
     inputs = [source.path] if isinstance(source, Campaign) else []
-    write_results(Path(folder), output.files, overwrite=force, inputs=inputs)
+    write_results(Path(folder), files, overwrite=force, inputs=inputs)
     return load_campaign(Path(folder) / "campaign.toml")
