@@ -88,7 +88,7 @@ def test_sweeps_of_many_amplitudes(paper_model, swept, count):
         assert len(legend(figure.axes[1])) == count
     whole(gap(paper_model, paper_model, [data_set]), apart=False)
     whole(prediction(Result(paper_model), Direction.AXIAL, data_set, amplitudes=amplitudes), apart=False)
-    seen = Inspection(Path(f"{LONG_NAME}.csv"), "sweep", Direction.AXIAL, {}, (), {}, (), {}, data_set.sweep)
+    seen = Inspection(Path(f"{LONG_NAME}.csv"), "sweep", Direction.AXIAL, {}, (), {}, (), {}, data_set.test)
     left, right = whole(inspection_figure([seen]), apart=False).axes
     assert len(points(left)) == count
     assert len(right.child_axes) == (count > 8)
