@@ -9,7 +9,7 @@ from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.document import Description
 from bushfit.diagnosis.holdout import HoldOut, HoldOutPart
 from bushfit.diagnosis.locate import find_regions
-from bushfit.diagnosis.power_law import PowerLaw, nearest_power_law
+from bushfit.diagnosis.power_law import nearest_power_law
 from bushfit.effects.contract import Array
 from bushfit.effects.unnamed import NAME, Unnamed
 from bushfit.errors import FitError
@@ -35,7 +35,7 @@ class GapDescription:
             harmonic.
         fitted: fit of the parameters with the correction treated as a random error of the model.
         holdout: root mean square residuals of held-out runs inside the tested range, without and with the correction.
-        power_law: nearest power law of frequency and amplitude; None if the tests show no power law.
+        description: nearest power law of frequency and amplitude; None if the tests show no power law.
         sentence: text on the size and the form of the gap, for the summary.
         evidence: text on the range of tests in which the correction is valid.
     """
@@ -43,16 +43,9 @@ class GapDescription:
     after: FitResult
     fitted: FitResult
     holdout: HoldOut
-    power_law: PowerLaw | None
+    description: Description | None
     sentence: str
     evidence: str
-
-    @property
-    def description(self) -> Description | None:
-        """Entry of diagnosis.json for the power law of the gap; None if the gap does not follow a power law."""
-        if (law := self.power_law) is None:
-            return None
-        return Description(law.phase_deg, law.frequency_power, law.amplitude_power, law.sentence)
 
 
 def describe(
@@ -84,7 +77,7 @@ def describe(
     """
     if NAME in fit.model.effects:
         return None
-    law, harmonic = None, tuple(test.fundamental() for test in fit.data_sets)
+    description, harmonic = None, tuple(test.fundamental() for test in fit.data_sets)
     fitted, correction = with_model_error(fit, bounds, rig, smooth=True, certain=has_candidates)
     if correction is None or correction.uncertainty >= 1.0:
         return None
@@ -99,8 +92,9 @@ def describe(
         except FitError:  # too few points are left for the parameters
             return None
         law = nearest_power_law(base, rig, start, bounds)
-        law = law if law and law.is_likely and any(law.determined) else None
-        sentence += f"; {law.sentence if law else 'its form is not a power law'}"
+        if law and law.is_likely and any(law.determined):
+            description = Description(law.phase_deg, law.frequency_power, law.amplitude_power, law.sentence)
+        sentence += f"; {description.words if description else 'its form is not a power law'}"
     model = replace(fitted.model, effects=(*fit.model.effects, NAME), unnamed=correction)
     plain = replace(fitted, noise_weighted=())  # residuals of the tests with their noise alone
     after, whole = plain.reevaluate(model, harmonic), plain.reevaluate(model, fit.data_sets)
@@ -109,7 +103,7 @@ def describe(
         if (beside_effects.after or 0.0) >= (beside_effects.before or np.inf):
             return None
     holdout = _hold_out_inside(before or fit, fitted)
-    return GapDescription(after, fitted, holdout, law, sentence, _validity(correction, whole))
+    return GapDescription(after, fitted, holdout, description, sentence, _validity(correction, whole))
 
 
 def _hold_out_inside(before: FitResult, fitted: FitResult) -> HoldOut:

@@ -31,6 +31,11 @@ class Group:
     covered_rows: tuple[slice, int] | None = None
 
     @property
+    def row_count(self) -> int:
+        """Number n of all residuals."""
+        return self.covered_rows[1] if self.covered_rows else self.columns.shape[1]
+
+    @property
     def whole(self) -> Array:
         """Changes of all n residuals per unit amount of each column, (c, n)."""
         if self.covered_rows is None:

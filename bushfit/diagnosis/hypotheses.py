@@ -14,6 +14,7 @@ from bushfit.diagnosis.faulty_parts import FaultyPart, OutlierCluster
 from bushfit.diagnosis.laplace import laplace
 from bushfit.diagnosis.linear_model import GroupEvidence, LinearModel
 from bushfit.diagnosis.priors import LEVELS
+from bushfit.diagnosis.projected_columns import CompoundDeviation, GroupSet
 from bushfit.diagnosis.propose import Proposal, proposals
 from bushfit.diagnosis.recorded_tests import RecordedTests
 from bushfit.diagnosis.rig_errors import in_scatter_units
@@ -230,7 +231,9 @@ class SearchState:
         The covariance includes errors of the rig, all patterns of a deviation of the compound and its fast relaxation.
         """
         bare, values = self.bare, self.bare.model.values
-        linear = replace(self.linear, compound=compound(bare, MAXIMUM_NODES), chosen_cases=self._likely_cases)
+        group = compound(bare, MAXIMUM_NODES)
+        deviation = CompoundDeviation(group, self.tests.errors) if group else None
+        linear = replace(self.linear, compound=deviation, chosen_cases=self._likely_cases)
         moves = np.isfinite([self.precision.get(name, 0.0) for name in bare.names])
         slopes, count = bare.coordinates.slopes(values)[moves], np.count_nonzero(moves)
         names = tuple(np.array(bare.names)[moves].tolist())
@@ -253,27 +256,23 @@ class SearchState:
     @cached_property
     def explanation_evidence(self) -> list[tuple[Explanation, GroupEvidence]]:
         """Further explanations of the gap, each with the evidence of the tests for it in the linearised model."""
-        effects = self.proposals if self.may_grow else []
-        explanations = [e for e in (*effects, *self.tests.explanations) if e.group is not None]
-        return list(zip(explanations, self.weigh(explanations), strict=True))
+        tests, effects = self.tests, [e for e in self.proposals if e.group] if self.may_grow else []
+        sets = GroupSet.split([e.group for e in effects if e.group], tests.errors)
+        evidence = self.weigh([*sets, *tests.explanation_sets])
+        return list(zip([*effects, *tests.explanations], evidence, strict=True))
 
-    def weigh(self, explanations: Sequence[Explanation]) -> list[GroupEvidence]:
-        """Evidence of the tests for given explanations, averaged over the likely sizes of the rig's errors.
-
-        Args:
-            explanations: effects, faulty parts or curves, each with its residual columns.
+    def weigh(self, sets: Sequence[GroupSet]) -> list[GroupEvidence]:
+        """Evidence of the tests for sets of explanations, averaged over the likely sizes of the rig's errors.
 
         Returns:
             One evidence per explanation, in the same order.
         """
-        near = replace(self.linear, chosen_cases=self._likely_cases)
-        return near.group_evidence_of([e.group for e in explanations if e.group is not None])
+        return replace(self.linear, chosen_cases=self._likely_cases).group_evidence_of(sets)
 
     @cached_property
     def _likely_cases(self) -> Array:
         """Indices of the noise cases (sizes of rig errors) that are likely, alone or together with a smooth curve."""
-        smooth = [e.group for e in self.tests.explanations if e.group and e.kind == "unnamed"]
-        curves = replace(self.linear, groups=smooth, compound=None)
+        curves = replace(self.linear, groups=self.tests.curves, compound=None)
         return np.union1d(self.linear.likely_cases(_NEAR), curves.likely_cases(_NEAR))
 
     def extended(

@@ -17,15 +17,21 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import pairwise
 
 import numpy as np
 from scipy.special import chdtrc, log_ndtr
 
 from bushfit.diagnosis.explanations import Group
 from bushfit.diagnosis.priors import SIZES
-from bushfit.diagnosis.projected_columns import AT_ONCE, ProjectedColumns
+from bushfit.diagnosis.projected_columns import CompoundDeviation, GroupSet, RigRows
+from bushfit.diagnosis.rig_errors import RigErrors
 from bushfit.effects.contract import Array
+
+#: Information added to each parameter, relative to its own, so that the matrix of undetermined parameters has an
+#: inverse.
+_ROUNDING = 1e-9
+#: Posterior weight of a noise case below which it changes no mean: rounding.
+_NEGLIGIBLE = 1e-15
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,12 +65,109 @@ _SMALL = 0.03
 
 
 @dataclass(frozen=True, eq=False)
-class LinearModel(ProjectedColumns):
+class Products:
+    """Evidence without a further explanation, and inner products with P, in each noise case.
+
+    P projects out the parameters and the compound's deviation, and whitens by the rig's errors. A block is a set of
+    columns that act together; blocks are collected by their number of columns (width) for array operations.
+
+    Args:
+        base: natural log of the prior weight of the case times the evidence without a further explanation, (cases,).
+        misfit: r^T P r of the residuals r, (cases,).
+        deviation: posterior mean of the amounts of the q modes of the compound's deviation, (cases, q).
+        projections: U^T P r of the blocks U, an array (cases, blocks, width) for each width.
+        grams: U^T P U of the blocks U, an array (cases, blocks, width, width) for each width.
+    """
+
+    base: Array
+    misfit: Array
+    deviation: Array
+    projections: list[Array]
+    grams: list[Array]
+
+
+@dataclass(frozen=True, eq=False)
+class LinearModel:
     """Linearised residuals of a fitted model, from which the evidence for each further explanation is computed.
 
     All log evidences are natural logs of the marginal likelihood, averaged over noise cases and up to a common
     constant. A noise case is one assumption on the sizes of the rig's errors and of the compound's deviation.
+
+    Args:
+        residual: residuals in units of the scatter from point to point, (n,).
+        jacobian: derivatives of the residuals with respect to the parameters and the deviations of faulty parts, (k,
+            n).
+        precision: prior precision of each row of the Jacobian, 0 for a flat prior, (k,).
+        rig: errors of the rig. Each of its noise cases assumes a size of these errors and of the compound's deviation
+            from the model's laws.
+        groups: candidate explanations; None without any.
+        chosen_cases: indices of the noise cases to average over; None for all cases.
+        compound: deviation of the compound, part of every hypothesis; None without a deviation.
     """
+
+    residual: Array
+    jacobian: Array
+    precision: Array
+    rig: RigErrors
+    groups: GroupSet | None = None
+    chosen_cases: Array | None = None
+    compound: CompoundDeviation | None = None
+
+    @cached_property
+    def cases(self) -> Array:
+        """Indices of the noise cases to average over; without `compound`, only cases without a deviation."""
+        chosen = np.arange(len(self.rig.cases)) if self.chosen_cases is None else self.chosen_cases
+        return np.array([n for n in chosen.tolist() if self.compound or not self.rig.cases[n].compound], dtype=int)
+
+    @cached_property
+    def deviations(self) -> Array:
+        """Standard deviation of the compound's deviation from the model in each case, relative to |K|, (cases,)."""
+        return np.array([self.rig.cases[n].compound for n in self.cases])
+
+    @cached_property
+    def combinations(self) -> Array:
+        """Index of the combination of sizes of the rig's errors in each case, (cases,)."""
+        return self.rig.combinations[1][self.cases]
+
+    @cached_property
+    def products(self) -> Products:
+        """Evidence without a further explanation, and inner products, in each noise case."""
+        rig, groups, has_prior = self.rig, self.groups, self.precision > 0.0
+        first = RigRows(np.concatenate([self.residual[None], self.jacobian]), rig)
+        none = Group(np.zeros((0, self.residual.size)), np.zeros((0, 1)), act_together=True)
+        compound = self.compound or CompoundDeviation(none, rig)
+        used, index = np.unique(self.combinations, return_inverse=True)
+        gram, modes = first.inner(first, used), compound.inner(first, used)
+        if groups:
+            gram = np.concatenate((gram, first.inner(groups.rows, used)), axis=-1)
+            modes = np.concatenate((modes, groups.with_modes(compound, used)), axis=-1)
+        flat, modes = slice(1, len(first.rows)), modes[index]
+        variance = np.square(self.deviations)[:, None]
+        grown = 1.0 + variance * compound.modes[0][self.combinations]
+        shrinkage = variance / grown  # of the products with each mode
+        gram = gram[index] - (modes[..., : flat.stop] * shrinkage[..., None]).swapaxes(1, 2) @ modes
+        by_noise = np.einsum("kn,kn->k", self.jacobian, self.jacobian)
+        scale = np.sqrt(np.maximum(by_noise + self.precision, np.finfo(float).tiny))
+        information = gram[:, flat, flat] + np.diag(self.precision)
+        root = np.linalg.cholesky(information / np.outer(scale, scale) + _ROUNDING * np.eye(scale.size))
+        inverse = np.linalg.inv(root) / scale
+        free = inverse @ gram[:, flat]
+        residual = gram[:, 0] - np.einsum("nk,nkc->nc", free[..., 0], free)
+        parameters = np.einsum("nkj,nk->nj", inverse, free[..., 0])
+        deviation = shrinkage * (modes[..., 0] - np.einsum("nqk,nk->nq", modes[..., flat], parameters))
+        log_det = rig.roots[1][self.combinations] + np.sum(np.log(grown), axis=1)
+        log_det += 2.0 * np.sum(np.log(np.einsum("nkk->nk", root) * scale), axis=1)
+        log_det -= np.sum(np.log(self.precision[has_prior]))
+        projections, projected = [], []
+        for (_, columns), products in zip(groups.blocks, groups.within(used), strict=True) if groups else ():
+            rows = flat.stop + columns
+            absorbed = np.moveaxis(free[..., rows], 1, -1)  # (cases, blocks, width, k)
+            smooth = np.moveaxis(modes[..., rows], 1, -1)
+            products = products[index] - (smooth * shrinkage[:, None, None]) @ smooth.swapaxes(-1, -2)
+            projected.append(products - absorbed @ absorbed.swapaxes(-1, -2))
+            projections.append(residual[:, rows])
+        base = np.array([rig.cases[n].log_weight for n in self.cases]) - 0.5 * (residual[:, 0] + log_det)
+        return Products(base, residual[:, 0], deviation, projections, projected)
 
     @cached_property
     def _is_plain(self) -> Array:
@@ -79,11 +182,12 @@ class LinearModel(ProjectedColumns):
             For each group, gain and squared change, (cases, blocks, sizes) each; a block is a set of columns that act
             together.
         """
-        gains: list[list[tuple[Array, Array]]] = [[] for _ in self.groups]
+        groups, blocks = (self.groups.groups, self.groups.blocks) if self.groups else ((), [])
+        gains: list[list[tuple[Array, Array]]] = [[] for _ in groups]
         products = self.products
-        for (numbers, _), projections, gram in zip(self.blocks, products.projections, products.grams, strict=True):
-            units = [self.groups[number].unit if self.groups[number].act_together else np.eye(1) for number in numbers]
-            senses = np.array([self.groups[number].sign for number in numbers])
+        for (numbers, _), projections, gram in zip(blocks, products.projections, products.grams, strict=True):
+            units = [groups[number].unit if groups[number].act_together else np.eye(1) for number in numbers]
+            senses = np.array([groups[number].sign for number in numbers])
             for number, gain, changes in zip(numbers, *_block_gains(gram, projections, units, senses), strict=True):
                 gains[number].append((gain, changes))
         stacked = (zip(*blocks, strict=True) for blocks in gains)
@@ -117,19 +221,9 @@ class LinearModel(ProjectedColumns):
         likeliest = float(SIZES[int(np.argmax(share.sum(axis=(0, 1))))])
         return GroupEvidence(total - float(np.log(log_evidence[0].size)), size, likeliest, with_compound)
 
-    def group_evidence_of(self, groups: Sequence[Group]) -> list[GroupEvidence]:
-        """Evidence of the tests for further explanations of the gap, each given as a group; in parts to limit memory.
-
-        Returns:
-            One evidence per group, in the same order.
-        """
-        part = np.cumsum([len(group.columns) for group in groups]) * self.residual.size // AT_ONCE
-        ends = [0, *(np.flatnonzero(np.diff(part)) + 1).tolist(), len(groups)]
-        return [
-            evidence
-            for start, stop in pairwise(ends)
-            for evidence in replace(self, groups=groups[start:stop]).group_evidence
-        ]
+    def group_evidence_of(self, sets: Sequence[GroupSet]) -> list[GroupEvidence]:
+        """Evidence of the tests for the explanations in several sets, in the same order."""
+        return [evidence for groups in sets for evidence in replace(self, groups=groups).group_evidence]
 
     @cached_property
     def evidence(self) -> GroupEvidence:
@@ -138,11 +232,13 @@ class LinearModel(ProjectedColumns):
         With a deviation of the compound, `size` and `likeliest` are those of the deviation, relative to |K|.
         """
         base, deviates, with_compound = self.products.base, self.deviations > 0.0, None
-        if deviates.any():
+        if self.compound and deviates.any():
             log_evidence, sizes = _log_sum(base[deviates]), self.deviations[deviates]
             share = np.exp(base[deviates] - log_evidence)
             likeliest = max(np.unique(sizes), key=lambda size: share[sizes == size].sum())
-            size = float(np.sqrt(share @ self.products.changes[deviates]))
+            likely = np.flatnonzero(share > _NEGLIGIBLE)
+            amounts, combinations = (x[deviates][likely] for x in (self.products.deviation, self.combinations))
+            size = float(np.sqrt(share[likely] @ self.compound.largest_changes(amounts, combinations)))
             with_compound = GroupEvidence(log_evidence, size, float(likeliest))
         return GroupEvidence(_log_sum(base[self._is_plain]), 0.0, 0.0, with_compound)
 
@@ -201,8 +297,8 @@ class LinearModel(ProjectedColumns):
         evidence by N(a; 0, c + v^2)/N(a; 0, c), where a is its estimate and c the variance of a (Savage and Dickey).
         """
         rows = np.concatenate((self.jacobian, relaxation[None]))
-        group = Group(rows, np.eye(len(rows)), act_together=True)
-        alone = replace(self, jacobian=self.jacobian[:0], precision=self.precision[:0], groups=(group,)).products
+        groups = GroupSet((Group(rows, np.eye(len(rows)), act_together=True),), self.rig)
+        alone = replace(self, jacobian=self.jacobian[:0], precision=self.precision[:0], groups=groups).products
         wide = np.append(self.precision, np.square(_SMALL / SIZES[-1]))
         covariance = np.linalg.inv(alone.grams[0][:, 0] + np.diag(wide))
         shift = np.einsum("nij,nj->ni", covariance, alone.projections[0][:, 0])
@@ -229,7 +325,7 @@ class LinearModel(ProjectedColumns):
         """
         width, block = next(
             (width, int(np.flatnonzero(numbers == number)[0]))
-            for width, (numbers, _) in enumerate(self.blocks)
+            for width, (numbers, _) in enumerate(self.groups.blocks if self.groups else ())
             if number in numbers
         )
         chosen, products = self._is_plain, self.products

@@ -24,6 +24,7 @@ from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.explanations import Group
 from bushfit.diagnosis.linear_model import LinearModel
 from bushfit.diagnosis.priors import DECISIVE_CHI_SQUARE
+from bushfit.diagnosis.projected_columns import GroupSet
 from bushfit.diagnosis.rig_errors import in_scatter_units, rig_errors
 from bushfit.diagnosis.smooth_deviations import unnamed_curves
 from bushfit.effects.contract import Array
@@ -203,11 +204,7 @@ class Term:
         return shapes / np.abs(shapes * self.unit(model) / self.stiffness(model)).max(axis=-1)[:, None]
 
     def residual(self, value: Array, model: Model) -> Array:
-        """Whitened residuals of a model with a stiffness, `value` (p,) in the unit `measure`, added at each point.
-
-        Returns:
-            Residuals of all tests and priors, (n,).
-        """
+        """Whitened residuals, (n,), of a model with an added stiffness, `value` (p,) in the unit `measure`."""
         residuals, added = self.fit.problem.residual(model), value * self.unit(model)
         for test, points in self.tests:
             rows = self.fit.residual_rows[test]
@@ -242,9 +239,8 @@ class Term:
                 stiffness, change = test.stiffness_slopes(model, names)
                 change = test.residual_change((1.0 + share / stiffness) * change, model, added[points])
             else:
-                change = test.jacobian(model, names) + test.residual_change(
-                    share * log_slopes(model, test, names), model
-                )
+                change = test.residual_change(share * log_slopes(model, test, names), model)
+                change += test.jacobian(model, names)
             rows[:, place[test]] = slopes * change
         return residuals, rows, columns.reshape(2, len(shapes), -1).swapaxes(0, 1)
 
@@ -266,7 +262,8 @@ def nearest_power_law(
     bare, model = in_scatter_units(fitted), fitted.model
     begun = model.with_values({name: value for name, value in start.items() if name in model.values})
     rows, smooth_curves = bare.jacobian, [curve.group for curve in unnamed_curves(bare) if curve.group]
-    plain = LinearModel(bare.residual, rows, np.zeros(len(rows)), rig_errors(bare, rig), smooth_curves)
+    errors = rig_errors(bare, rig)
+    plain = LinearModel(bare.residual, rows, np.zeros(len(rows)), errors, GroupSet(smooth_curves, errors))
     plain = replace(plain, chosen_cases=plain.likely_cases(_NEAR))
     terms = [term for measure in _MEASURES if (term := Term(bare, measure)).has_one_meaning]
     settled = (_settled_grid(fitted, term, plain, begun, bounds) for term in terms)
@@ -357,7 +354,8 @@ def _settled_grid(fitted: FitResult, term: Term, plain: LinearModel, model: Mode
         shapes = term.scaled(np.exp(powers @ term.points.T), model)
         residuals, rows, columns = term.linearised(model, value, shapes)
         groups = [Group(pair, np.ones(2), act_together=True) for pair in columns]
-        grid = _Grid(term.measure, replace(plain, residual=residuals, jacobian=rows, groups=groups), powers, step)
+        linear = replace(plain, residual=residuals, jacobian=rows, groups=GroupSet(groups, plain.rig))
+        grid = _Grid(term.measure, linear, powers, step)
         before, middle = middle, grid.share @ powers
         spread = np.sqrt(grid.share @ np.square(powers - middle))
         shift = np.abs(middle - before)

@@ -5,10 +5,10 @@ Notes:
     less the part that the model's parameters can absorb.
 """
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from itertools import product
+from itertools import compress, product
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from bushfit.effects.contract import Array
 from bushfit.errors import FitError, ModelError
 from bushfit.fitting.descent import Descent
 from bushfit.fitting.design import shape_start_values
-from bushfit.fitting.preparation import MeasuredTest
+from bushfit.fitting.preparation import MeasuredTest, residual_slices
 from bushfit.fitting.problem import FitProblem, FitResult
 from bushfit.geometry import shared_labels
 from bushfit.model.model import Model
@@ -190,7 +190,7 @@ def sensitivity(
         Sets of shape parameters by name, and the change of the n whitened residuals due to a typical amount of the
         effect for each set, (shapes, n).
     """
-    bare, model = model, model.with_effect(effect.name)
+    model = model.with_effect(effect.name)
     axes = {
         qualified_name(effect, parameter): shape_start_values(data_sets, model, parameter)
         for parameter in effect.parameters
@@ -200,23 +200,16 @@ def sensitivity(
     amount = qualified_name(effect, effect.amount)
     none = model.values[amount]
 
-    def residuals_of(shapes: Sequence[Mapping[str, float]]) -> Array:
-        """Whitened residuals of all tests with a small amount of the effect, at each set of its shape parameters.
-
-        Returns:
-            Residuals, (shapes + 1, n); the last row is without the effect.
-        """
+    for _ in range(2):  # the second time without shapes that have no finite response, such as the last one
         amounts = np.append(np.full(len(shapes), none + _STEP * effect.amount.typical), none)[:, None]
         grids = {name: np.array([[shape[name]] for shape in (*shapes, shapes[-1])]) for name in axes}
         values = {**model.values, **grids, amount: amounts}
-        rows = [
-            data_set.residual(model, values) if effect.acts_at(data_set.direction) else data_set.residual(bare)
-            for data_set in data_sets
-        ]
-        return np.concatenate([np.broadcast_to(row, (len(amounts), row.shape[-1])) for row in rows], axis=-1)
-
-    rows = residuals_of(shapes)
-    is_finite = np.asarray(np.isfinite(rows).all(axis=1))
-    shapes = [shape for shape, finite in zip(shapes, is_finite[:-1], strict=True) if finite]
-    rows = residuals_of(shapes) if shapes and not is_finite[-1] else rows[[*is_finite[:-1], True]]
+        rows = np.zeros((len(amounts), sum(data_set.size for data_set in data_sets)))  # the last without the effect
+        for data_set, columns in zip(data_sets, residual_slices(data_sets), strict=True):
+            if effect.acts_at(data_set.direction):
+                rows[:, columns] = data_set.residual(model, values)
+        is_finite = np.asarray(np.isfinite(rows).all(axis=1))
+        shapes, rows = list(compress(shapes, is_finite)), rows[[*is_finite[:-1], True]]
+        if is_finite[-1] or not shapes:
+            break
     return shapes, (rows[:-1] - rows[-1]) / _STEP

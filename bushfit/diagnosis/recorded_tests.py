@@ -10,6 +10,7 @@ from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.claims import Claim
 from bushfit.diagnosis.explanations import Explanation, Group
 from bushfit.diagnosis.faulty_parts import FaultyPart, find_faulty_parts
+from bushfit.diagnosis.projected_columns import CompoundDeviation, GroupSet
 from bushfit.diagnosis.record import DiagnosisSettings
 from bushfit.diagnosis.rig_errors import RigErrors, in_scatter_units, rig_errors
 from bushfit.diagnosis.smooth_deviations import compound, unnamed_curves
@@ -52,12 +53,13 @@ class RecordedTests:
         return rig_errors(self.bare, self.rig)
 
     @cached_property
-    def compound(self) -> Group | None:
+    def compound(self) -> CompoundDeviation | None:
         """Changes of the residuals, in units of the scatter, if the rubber deviates smoothly from the model's laws.
 
         Hypotheses are compared with these changes. None without tests.
         """
-        return compound(self.bare)
+        group = compound(self.bare)
+        return CompoundDeviation(group, self.errors) if group else None
 
     @cached_property
     def compound_in_fits(self) -> Group | None:
@@ -76,3 +78,14 @@ class RecordedTests:
     def explanations(self) -> list[Explanation]:
         """Explanations of the gap that are independent of the model's effects: faulty test parts, and smooth curves."""
         return [*find_faulty_parts(self.bare), *unnamed_curves(self.bare)]
+
+    @cached_property
+    def explanation_sets(self) -> list[GroupSet]:
+        """Columns of `explanations`."""
+        return GroupSet.split([e.group for e in self.explanations if e.group], self.errors)
+
+    @cached_property
+    def curves(self) -> GroupSet | None:
+        """Columns of the smooth curves among `explanations`; None without tests."""
+        curves = [e.group for e in self.explanations if e.group and e.kind == "unnamed"]
+        return GroupSet(curves, self.errors) if curves else None

@@ -256,7 +256,7 @@ class DiagnosisWriter:
         else:
             sentences = ["no known effect closes the gap", *causes_text(candidates, self.finding)]
         entries = [NamedCause(UNNAMED, gap.evidence, tuple(c.label for c in candidates))] if gap else []
-        places = first.best if first.faulty_parts and not gap else None
+        places = None if gap else first.best
         verdict: Verdict = "described" if gap else "unexplained"
         return self._build(closing, "; ".join(sentences), entries, verdict=verdict, places=places, next_test=advice)
 

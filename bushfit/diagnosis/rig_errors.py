@@ -92,7 +92,7 @@ class RigErrors:
 
         Returns:
             L^-1 D of S = 1 + D W W^T D = L L^T, (combinations, blocks, w, w), with the errors' columns W and sizes D;
-            and ln|S|, (combinations,).
+            and the natural log of the determinant of the covariance of scatter and rig errors, (combinations,).
 
         Notes:
             For rows R, the whitened inner products are R R^T - (L^-1 D W R^T)^T (L^-1 D W R^T).
@@ -109,8 +109,15 @@ class RigErrors:
         share = np.where(scatters, 1.0 / sizes[:, :1], 1.0)[..., None]
         errors = np.pad(sizes[:, 1:], ((0, 0), (0, 1)))[:, kinds] * share
         root = np.linalg.cholesky(np.eye(width) + errors[..., None] * inner * errors[..., None, :])
+        scattering = {row for block in self.blocks if block.scatters for row in block.rows.tolist()}
         log_det = 2.0 * np.sum(np.log(np.einsum("nbii->nbi", root)), axis=(1, 2))
+        log_det -= len(scattering) * np.log(self.precision)
         return np.linalg.inv(root) * (errors * share)[..., None, :], log_det
+
+    @cached_property
+    def precision(self) -> Array:
+        """Estimated variance of the scatter of sweeps over the assumed one, in each combination, (combinations,)."""
+        return 1.0 / np.square(self.combinations[0][:, 0])
 
 
 def in_scatter_units(fit: FitResult) -> FitResult:

@@ -10,6 +10,7 @@ from collections import Counter
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import product
 from math import log
 
@@ -21,6 +22,7 @@ from bushfit.diagnosis.faulty_parts import FaultyPart, OutlierCluster
 from bushfit.diagnosis.fits import fit_rivals
 from bushfit.diagnosis.hypotheses import Hypothesis, SearchState
 from bushfit.diagnosis.priors import BEAM, DOES_NOT_FIT, LOG_ODDS_CUTOFF, NAMED, ODDS, REFITS, ROUNDS
+from bushfit.diagnosis.projected_columns import GroupSet
 from bushfit.diagnosis.propose import has_used_parameters
 from bushfit.diagnosis.record import DiagnosisSettings
 from bushfit.diagnosis.recorded_tests import RecordedTests
@@ -31,7 +33,6 @@ from bushfit.errors import FitError, ModelError
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.problem import FitResult
 from bushfit.geometry import stiffness_per_modulus
-from bushfit.model.model import Model
 from bushfit.progress import track
 
 #: Maximum number of refits of hypotheses that are probable by the linear model alone; for time.
@@ -79,6 +80,7 @@ class Search:
         log_prior = log(1.0 - sum(ODDS.values()))
         tests = RecordedTests(self.base, self.data.campaign.rig, settings.without, log_prior, max_effects=limit)
         self.root = SearchState.of_tests(tests)
+        self._fit_rivals = partial(fit_rivals, fixed=self.base.fixed, bounds=self.data.bounds)
         self._log_priors = prior_odds([*self.root.proposals, *tests.explanations])
         families = {e.family for e in (*self.outlier_clusters, *tests.explanations) if e.kind == "part"}
         self._meeting_odds = log(ODDS["part"] / max(len(families), 1)) - tests.log_prior
@@ -214,18 +216,12 @@ class Search:
         start = self.start if not state.effects and state.plain.reduced_chi_square > _BENT else {}
         grown: dict[str, SearchState] = {}
         for deviation in dict.fromkeys((state.likeliest_deviation, 0.0)):
-            for name, fit in self._refit(state, models, start, deviation).items():
+            columns = state.free_columns(deviation)
+            for name, fit in self._fit_rivals(models, state.fit.data_sets, start, columns=columns).items():
                 candidate = self._visit(state.with_effect(name, fit, self._log_odds("effect", name, depth)))
                 if name not in grown or candidate.log_posterior > grown[name].log_posterior:
                     grown[name] = candidate
         return list(grown.values())
-
-    def _refit(
-        self, state: SearchState, models: Mapping[str, Model], start: Mapping[str, float], deviation: float | None
-    ) -> dict[str, FitResult]:
-        """Fit models to the tests of a state, with its faults and the compound's deviation free; None: without."""
-        columns = None if deviation is None else state.free_columns(deviation)
-        return fit_rivals(models, state.fit.data_sets, start, self.base.fixed, self.data.bounds, columns)
 
     def _with_faulty_parts(self, state: SearchState, depth: int) -> Iterator[SearchState]:
         """Extend a state by each of its likeliest faulty parts of the tests, with a common shift or an error per point.
@@ -240,7 +236,8 @@ class Search:
             better, worth = part, shifted
             if part.family != "loop":
                 scattered_part = part.point_by_point()
-                (scattered,) = state.weigh([scattered_part])
+                groups = GroupSet([scattered_part.group], state.tests.errors)  # type: ignore[list-item]
+                (scattered,) = state.weigh([groups])
                 better, worth = (scattered_part, scattered) if scattered.total > shifted.total else (part, shifted)
             log_odds = self._log_odds("part", part.name, depth)
             improves = state.log_weight + log_odds + worth.total > state.log_posterior
@@ -254,9 +251,9 @@ class Search:
                 change=max(state.change, worth.size),
             )
             if grown.plain.reduced_chi_square > _BENT:  # perhaps by the part
-                starts = [{}] if grown.effects else [{}, self.start]
-                refits = [self._refit(grown, {"": grown.fit.model}, start, 0.0) for start in starts]
-                fits = [fit for by_name in refits for fit in by_name.values()]
+                models, columns, fits = {"": grown.fit.model}, grown.free_columns(0.0), list[FitResult]()
+                for start in [{}] if grown.effects else [{}, self.start]:
+                    fits += self._fit_rivals(models, grown.fit.data_sets, start, columns=columns).values()
                 grown = replace(grown, fit=min(fits, key=lambda fit: fit.chi_square, default=grown.fit))
             yield self._visit(grown)
 
@@ -267,7 +264,7 @@ class Search:
         for name, model in shorter.items():
             if state.key - {name} in self._visited or not all(has_used_parameters(e, model) for e in model.records):
                 continue
-            for fit in self._refit(state, {name: model}, {}, None).values():
+            for fit in self._fit_rivals({name: model}, state.fit.data_sets, {}).values():
                 yield self._visit(self._with_fit(state, [e for e in state.effects if e != name], fit))
 
     def _with_fit(self, state: SearchState, effects: Sequence[str], fit: FitResult) -> SearchState:
@@ -300,7 +297,8 @@ class Search:
         near.sort(key=lambda n: -states[n].log_posterior)
         for n in near[:_RIVALS] if leader.likeliest_deviation and not leader.faulty_parts else ():
             state, start = states[n], leader.fit.model.values
-            for fit in self._refit(state, {"": state.fit.model}, start, leader.likeliest_deviation).values():
+            models, columns = {"": state.fit.model}, state.free_columns(leader.likeliest_deviation)
+            for fit in self._fit_rivals(models, state.fit.data_sets, start, columns=columns).values():
                 candidate = self._visit(self._with_fit(state, state.effects, fit))
                 states[n] = max(state, candidate, key=lambda rival: rival.log_posterior)
         return states

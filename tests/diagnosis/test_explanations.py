@@ -14,6 +14,7 @@ from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.explanations import Explanation
 from bushfit.diagnosis.faulty_parts import find_faulty_parts, is_pattern
 from bushfit.diagnosis.linear_model import LinearModel
+from bushfit.diagnosis.projected_columns import GroupSet
 from bushfit.diagnosis.propose import proposals
 from bushfit.diagnosis.rig_errors import in_scatter_units, rig_errors
 from bushfit.diagnosis.smooth_deviations import compound_shapes
@@ -31,7 +32,7 @@ def best(evidence: FitResult, every: Sequence[Explanation]) -> Explanation:
     rig = rig_errors(evidence, SHARED_RIG)
     solution = evidence
     precision = np.zeros(len(solution.jacobian))
-    worths = LinearModel(solution.residual, solution.jacobian, precision, rig, groups).group_evidence
+    worths = LinearModel(solution.residual, solution.jacobian, precision, rig, GroupSet(groups, rig)).group_evidence
     return max(zip(known, worths, strict=True), key=lambda pair: pair[1].log_evidence)[0]
 
 

@@ -11,6 +11,7 @@ from scipy.stats import multivariate_normal, norm
 from bushfit.diagnosis.explanations import Group
 from bushfit.diagnosis.linear_model import LinearModel
 from bushfit.diagnosis.priors import SIZES
+from bushfit.diagnosis.projected_columns import CompoundDeviation, GroupSet
 from bushfit.diagnosis.rig_errors import Block, NoiseCase, RigErrors
 from bushfit.effects.contract import Array
 
@@ -40,9 +41,9 @@ def ledger(seed: int, *, flat: int = 2, known: int = 1, rows: int = 10, groups: 
     )
     precision = np.repeat([0.0, 0.5], [flat, known])
     jacobian = random.normal(size=(flat + known, rows))
-    return LinearModel(
-        3.0 * random.normal(size=rows), jacobian, precision, RigErrors(blocks, CASES), made if groups else ()
-    )
+    rig = RigErrors(blocks, CASES)
+    chosen = GroupSet(made, rig) if groups else None
+    return LinearModel(3.0 * random.normal(size=rows), jacobian, precision, rig, chosen)
 
 
 def covariance(of: LinearModel, node: NoiseCase) -> Array:
@@ -80,7 +81,7 @@ def test_worth_is_that_of_the_covariance_in_full(seed):
     plain = [restricted(of, covariance(of, node)) for node in of.rig.cases]
     assert of.evidence.log_evidence == pytest.approx(over_nodes(of, plain), abs=1e-6)
     assert of.log_evidence_with_level_errors == pytest.approx(over_nodes(of, plain, wide=True), abs=1e-6)
-    for group, worth in zip(of.groups, of.group_evidence, strict=True):
+    for group, worth in zip(of.groups.groups, of.group_evidence, strict=True):
         if group.sign:
             continue
         parts = (
@@ -99,10 +100,9 @@ def test_worth_is_that_of_the_covariance_in_full(seed):
 def test_an_amount_is_integrated_over_its_sense(sense):
     """Numerically, and the free parameter with it: where an effect is missing, the model stays below the tests."""
     of = ledger(4, flat=1, known=0)
-    column, unit, own = of.groups[0].columns[0], 0.7, of.jacobian[0]
-    of = replace(
-        of, chosen_cases=np.array([0]), groups=(Group(column[None], np.array([unit]), act_together=False, sign=sense),)
-    )
+    column, unit, own = of.groups.groups[0].columns[0], 0.7, of.jacobian[0]
+    group = Group(column[None], np.array([unit]), act_together=False, sign=sense)
+    of = replace(of, chosen_cases=np.array([0]), groups=GroupSet((group,), of.rig))
     noise, spreads = multivariate_normal(cov=covariance(of, CASES[0])), SIZES / unit
     low, high = {1: (0.0, 1.0), -1: (-1.0, 0.0), 0: (-1.0, 1.0)}[sense]
     x, weight = np.polynomial.legendre.leggauss(300)
@@ -123,8 +123,10 @@ def test_a_deviation_of_the_compound_is_part_of_the_covariance(seed):
     columns = np.random.default_rng(seed).normal(size=(2, plain.residual.size))
     sizes = (0.0, 0.3, 0.7)
     nodes = [replace(node, compound=size) for node in CASES[:2] for size in sizes]
-    of = replace(plain, rig=RigErrors(plain.rig.blocks, nodes), compound=Group(columns, np.eye(2), act_together=True))
-    group, size = of.groups[0].columns, SIZES[:, None, None]
+    rig = RigErrors(plain.rig.blocks, nodes)
+    compound = CompoundDeviation(Group(columns, np.eye(2), act_together=True), rig)
+    of = replace(plain, rig=rig, groups=GroupSet(plain.groups.groups, rig), compound=compound)
+    group, size = of.groups.groups[0].columns, SIZES[:, None, None]
 
     def evidence(bent: bool, added: Array) -> float:
         own = [node for node in nodes if (node.compound > 0.0) is bent]
