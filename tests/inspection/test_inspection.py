@@ -108,7 +108,7 @@ LOOP_FAULTS: dict[str, Callable[[Loop], Loop]] = {
         lambda x: replace(x, time=1000.0 * x.time)
     ),
     "the force drifts: its mean goes from": lambda x: replace(x, force=x.force + 3.0 * x.time / x.time[-1]),
-    "the displacement drifts": lambda x: replace(x, displacement=x.displacement + 2e-5 * x.time / x.time[-1]),
+    "the displacement drifts": lambda x: replace(x, displacement=x.displacement - 2e-5 * x.time / x.time[-1]),
     "goes from 489.2 N in the first cycle to 466.4 in the last (-4.7 %)": lambda x: replace(
         x, force=x.force * (1.0 + 0.1 * np.exp(-x.time / 20.0))
     ),

@@ -72,6 +72,10 @@ PROGRAMMES: dict[str, tuple[Sequence[Array], Sequence[tuple[float, float]]]] = {
     ),
     "close": ([cycles(5, x) for x in (0.8, 0.9, 1)], slow(0.8, 0.9, 1)),
     "one comes again": ([cycles(4, x) for x in (1, 0.3, 1)], slow(1, 0.3, 1)),
+    "a disturbance": (
+        [cycles(4, 0.3), *(cycles(n, x) for n, x in ((4, 1), (1, 1.3), (4, 1)))],
+        slow(0.3, 1.037),
+    ),  # one part, with its larger cycle
     "about a mean": ([ramp(0, 1.5, 20), 1.5e-3 + cycles(4, 0.2), 1.5e-3 + cycles(4, 0.5)], slow(0.2, 0.5)),
 }
 
