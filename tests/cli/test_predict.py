@@ -247,7 +247,6 @@ def test_a_plan_for_targets_stops_once_they_are_met(root, tmp_path):
     ("source", "options", "said"),
     [
         (NEW, ("stiffness=0.001 %",), "the class of the rig, 0.5 % of gain and 4.4 mrad of phase"),
-        (NEW, ("loss_factor=0.01 %",), "the class of the rig, 0.5 % of gain and 4.4 mrad of phase"),
         (NEW, ("mu=0.25 %", "--hours", "2"), "2 h are too few; about"),
         (
             NEW,

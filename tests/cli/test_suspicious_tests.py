@@ -34,6 +34,8 @@ def test_copies_count_once(bushfit, own, once, command):
     done = bushfit(command, once, "-o", own / "copied", "--no-plots")
     assert "loop_axial_1: again.csv and linked.csv with the same data: used once" in done.stderr
     assert f"{2 * len(sweep)} points of repeats 2 and 3 are exact copies of an earlier repeat" in done.stderr
+    looked = bushfit("inspect", own / LOOP, (own / LOOP).with_name("again.csv"), "--no-plots", "-o", own / "i").stderr
+    assert looked.count("the same data are in") == 2
     single, copied = (load_result(own / folder / "model.json") for folder in ("once", "copied"))
     assert vars(copied.model)["values"] == vars(single.model)["values"]
     assert copied.covariance.stderr("m") == single.covariance.stderr("m")

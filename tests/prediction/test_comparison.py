@@ -17,6 +17,7 @@ from bushfit.geometry import Bushing, Direction
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import FIVE, Model
 from bushfit.model.result import Range, Result
+from bushfit.prediction.bands import Band
 from bushfit.prediction.comparison import Comparison, compare, with_holm
 from bushfit.prediction.parameter_comparison import ParameterContrast
 from bushfit.simulation.measured import measure
@@ -104,6 +105,30 @@ def test_known_differences_are_found_and_covered(fits, paper_model):
     assert np.mean(curves) >= 0.88
     assert np.mean(everywhere) >= 0.85
     assert all(seen)
+
+
+@pytest.mark.parametrize(
+    ("deviation", "joint", "named"),
+    [
+        (2.1, 0.2, []),  # stiffness differs at 3.6 %
+        (-2.1, 0.04, ["axial stiffness", "all parameters together"]),
+        (-2.4, 0.2, ["axial stiffness"]),  # at 1.6 %
+        (0.5, 0.04, []),
+        (0.5, 0.02, ["all parameters together"]),
+    ],
+)
+def test_the_headline_joins_two_tests(paper_model, deviation, joint, named):
+    """Hochberg's procedure: both at 5 %, or one at 2.5 %."""
+    one = known(paper_model, np.diag([1e8, 1e6, 1e-6, 1e4, 1e-8]))
+    found = against(one, one)
+    half = (1.96, 9.0) if deviation > 0.0 else (9.0, 1.96)  # the end away from zero does not matter
+    bands = [
+        Band(np.array([x]), np.array([x - half[0]]), np.array([x + half[1]]), np.ones((1, 1))) for x in (deviation, 0.0)
+    ]
+    contrast = replace(found.contrasts[0], stiffness=bands[0], loss_factor=bands[1])
+    assert replace(found, contrasts=(contrast,), joint=(joint, 5)).differing == named
+    unknown = replace(contrast, stiffness=replace(bands[0], root=np.empty((0, 1))), loss_factor=bands[1])
+    assert replace(found, contrasts=(replace(unknown, loss_factor=unknown.stiffness),), joint=None).differing == []
 
 
 @pytest.mark.parametrize("freedom", [1e6, 12.0])
