@@ -215,6 +215,5 @@ def note_not_understood(
             listed = ", ".join(values[:4]) + ", ..." * (len(values) > 4)
             yield (
                 f'"{header}" (column {index + 1}) varies from row to row ({listed}) and is not understood: all '
-                f'rows are one test; rows = {{ "{header}" = "{values[0]}" }} in the campaign selects '
-                "only these rows"
+                f'rows are one test. To select rows, write rows = {{ "{header}" = "{values[0]}" }} in the campaign'
             )

@@ -78,7 +78,7 @@ def si_column(table: Table, role: str, tested: Place, hint: str | None = None) -
         raise unclear(
             f"the logarithms of the {label} have no unit",
             expected="the reference, such as dB re 1 N/mm, or the unit, such as log10(N/mm)",
-            hint=f'units = {{ {role} = "{example}" }} in the campaign if the logarithm of 1 {example} is 0',
+            hint=f'if the value 0 means 1 {example}, write units = {{ {role} = "{example}" }} in the campaign',
         )
     if column.unit is None and (expected != "1" or role in OF_MOTION):
         angular = expected == "Hz" and is_angular(column.header, "1/s")
