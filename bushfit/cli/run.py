@@ -39,6 +39,7 @@ def command(campaigns: tuple[Path, ...], loss: Loss | None, max_nrmse: float | N
     """
     from bushfit.commands.provenance import input_files
     from bushfit.commands.run import run
+    from bushfit.effects.unnamed import NAME as UNNAMED
 
     campaign = open_campaign(campaigns)
     folder = output.folder(campaign.name, "model.json", "diagnosis.json")
@@ -46,7 +47,8 @@ def command(campaigns: tuple[Path, ...], loss: Loss | None, max_nrmse: float | N
     output.warn(outcome.data.notes)
     diagnosis, description = outcome.diagnosed and outcome.diagnosed.diagnosis, "the joint fit"
     if diagnosis and diagnosis.added:
-        effects = ", ".join(effect.label for effect in diagnosis.effects)
+        added = [name for name in diagnosis.result.model.effects if name not in diagnosis.before.model.effects]
+        effects = ", ".join("a smooth correction" if name == UNNAMED else name for name in added)
         description = f"with {effects}; joint.json: the fit without effects"
     elif diagnosis and diagnosis.changed:  # a mistake in the record is named
         description += " to the uncorrected tests: correct the record first, then run again"

@@ -32,7 +32,7 @@ def undecided_text(reported: Sequence[Composition]) -> str:
     shared = [name for name in parts[0] if all(name in names for names in parts)]
     *labels, last = (" + ".join(name for name in names if name not in shared) or "nothing else" for names in parts)
     sentence = f"these tests cannot distinguish between {', '.join(labels)} and {last}"
-    return f"all probable explanations contain {' and '.join(shared)}; for the rest, {sentence}" if shared else sentence
+    return f"{sentence}; all probable explanations also contain {' and '.join(shared)}" if shared else sentence
 
 
 def causes_text(candidates: Sequence[Composition], finding: Finding) -> list[str]:

@@ -203,7 +203,8 @@ def plan_warnings(search: PlanSearch) -> Iterator[str]:
     if model_error > _NOTABLE_RATIO - 1.0:
         yield (
             f"the errors of the stiffness include the model error, up to {number(100.0 * model_error, 2)} %, "
-            "which further tests do not reduce. bushfit diagnose looks for the missing effect"
+            "which further tests do not reduce. bushfit diagnose looks for the missing effect; "
+            "to plan with it, give its model.json to bushfit plan"
         )
     yield from knowledge.result.warnings
     if knowledge.bounded:

@@ -14,6 +14,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.colors import BoundaryNorm, ListedColormap
 
 from bushfit.effects.contract import Array
+from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.geometry import Place
 from bushfit.model.result import Result
 from bushfit.report.plots import style
@@ -60,7 +61,7 @@ def gap_figure(table: pd.DataFrame, result: Result, diagnosis: Mapping[str, Any]
     Returns:
         Figure with two columns, before and after, or one column if the diagnosis changes nothing.
     """
-    sides = column_titles(table, diagnosis)
+    sides = column_titles(table, result, diagnosis)
     sweeps = table[table["kind"] == "sweep"]
     groups = sweep_groups(sweeps, result) if len(sweeps) else []
     maps = [(group, map_rows(group)) for group in groups]
@@ -101,11 +102,12 @@ def gap_figure(table: pd.DataFrame, result: Result, diagnosis: Mapping[str, Any]
     )
 
 
-def column_titles(table: pd.DataFrame, diagnosis: Mapping[str, Any]) -> dict[str, str]:
+def column_titles(table: pd.DataFrame, result: Result, diagnosis: Mapping[str, Any]) -> dict[str, str]:
     """Titles of the columns of the figure, with the root mean square gap in units of noise.
 
     Args:
         table: table of the gap from `diagnosed.gap_table`.
+        result: final model.
         diagnosis: content of diagnosis.json.
 
     Returns:
@@ -116,13 +118,15 @@ def column_titles(table: pd.DataFrame, diagnosis: Mapping[str, Any]) -> dict[str
         for name in table
         if str(name).endswith("before [%]")
     )
-    effects, names = diagnosis["effects"], {"before": "before", "after": "after"}
+    names = {"before": "before", "after": "after"}
     if not changed:
         names = {"before": "nothing added"}
-    elif any(effect["test"] for effect in effects):
+    elif any(effect["test"] for effect in diagnosis["effects"]):
         names = {"before": "tests as recorded", "after": "with the record corrected"}
-    elif effects:
-        names["after"] = f"after adding {' and '.join(effect['name'] for effect in effects)}"
+    else:
+        found = {UNNAMED, *(effect["name"] for effect in diagnosis["effects"])}
+        added = ["a smooth correction" if name == UNNAMED else name for name in result.model.effects if name in found]
+        names["after"] = f"after adding {' and '.join(added)}" if added else names["after"]
     gaps = diagnosis["gap"]["calibration"]
     tails = {side: f"\ndata fitted {gaps[side]:.2f} × noise" for side in names if gaps[side] is not None}
     return {side: name + tails.get(side, "") for side, name in names.items()}
