@@ -375,7 +375,8 @@ def linear_stress(modulus: Callable[[Values, Array, Array], Array], p: Values, h
         p: parameter values by name.
         history: strain over a steady cycle, (..., n).
     """
-    return history.response(lambda omega: 2.0 * modulus(p, omega, history.amplitude))
+    transfer = 2.0 * modulus(p, history.harmonics, history.amplitude)
+    return np.fft.irfft(transfer * history.spectrum, n=history.value.shape[-1])
 
 
 def harmonic_stress(modulus: Callable[[Values, Array, Array], Array], p: Values, history: History) -> Array:
