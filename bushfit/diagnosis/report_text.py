@@ -1,7 +1,6 @@
 """The reported diagnosis: what closes the gap, and the texts on it.
 
-`DiagnosisWriter` receives the verdict of a search. It determines the model to use (`_close_gap`), changes the verdict
-if held-out tests or intervals contradict it, and writes summary, causes, regions of disagreement and next test.
+`DiagnosisWriter` receives the verdict of a search, and changes it if held-out tests or intervals contradict it.
 """
 
 from __future__ import annotations
@@ -191,14 +190,11 @@ class DiagnosisWriter:
         return self._build(closing, summary, entries, rest, places=first.best if first.faulty_parts else None)
 
     def _revised_finding(self, diagnosis: Diagnosis, holdout: HoldOut | None) -> Finding | None:
-        """Verdict in place of "named" or "partly" if intervals or held-out tests contradict the named effects.
+        """New verdict if intervals or held-out tests contradict the named effects; else None.
 
         Args:
             diagnosis: diagnosis with the named effects.
             holdout: residuals of held-out tests with effects that should close the gap; None if a part of it stays.
-
-        Returns:
-            The new verdict; None if nothing contradicts the effects.
         """
         finding, names = self.finding, self.finding.names
         absent = tuple(name for name in names if _may_be_absent(name, diagnosis.result))
