@@ -126,6 +126,7 @@ def test_a_part_is_as_good_as_its_worst_and_the_words_say_why(tmp_path):
         "fail",
         {"alpha": "alpha is not known", "verdict": "verdict not known, allowed consistent, named"},
     )
+    assert judged(limits(tmp_path, 'verdicts = ["named"]'), verdict="named") == ("pass", {}, {})
     assert RESULTS.index("not judged") > RESULTS.index("conditional pass"), "what is not judged is no pass"
 
 

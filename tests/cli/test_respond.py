@@ -24,6 +24,7 @@ def test_each_direction_has_displacement_force_and_band(bushfit, tmp_path):
         tmp_path, time__s=TIME, axial_displacement__mm=MOTION, torsion__deg=MOTION, radial_travel__um=50 * MOTION
     )
     done = bushfit("respond", "model", road, "-o", tmp_path / "out", "--json")
+    assert "resampled" not in done.stderr + done.stdout, "the times are even"
     table = pd.read_csv(tmp_path / "out/response.csv")
     np.testing.assert_allclose(table["time [s]"], TIME, atol=1e-6)
     np.testing.assert_allclose(table["axial displacement [mm]"], MOTION, atol=1e-5)

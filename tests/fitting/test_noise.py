@@ -78,6 +78,11 @@ def test_the_class_of_a_rig_is_an_error_of_each_level(noisy_sweep):
     assert "[rig]" in single.describe()
 
 
+def test_a_column_of_errors_states_the_scatter(noisy_sweep):
+    stated = replace(noisy_sweep(0), relative_error=np.tile([1e-2, 2e-2], noisy_sweep(0).frequency.size // 2))
+    np.testing.assert_allclose(scatter_of([sweep_noise([stated])]), np.sqrt(2.5e-4))
+
+
 def test_no_repeats_fall_back_to_a_smooth_curve_and_an_assumption(noisy_sweep):
     found = [sweep_noise([noisy_sweep(seed, 5e-3, repeats=1)]) for seed in range(50)]
     np.testing.assert_allclose(scatter_of(found), 5e-3, rtol=0.1)
