@@ -135,7 +135,13 @@ def respond(
 
 
 def draw_response(title: str, table: ResultFile, warnings: Sequence[str] = ()) -> Figure:
-    """Draw the force over time in a table of `respond`, or of a validation record, with warnings below the figure."""
+    """Draw the force over time in a table of `respond`, or of a validation record, with warnings below the figure.
+
+    Args:
+        title: title of the figure.
+        table: result file with the table.
+        warnings: sentences to print below the figure.
+    """
     return plots.response.response_figure(title, table.content(), plots.style.warnings_note(warnings))
 
 

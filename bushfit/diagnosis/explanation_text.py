@@ -61,7 +61,11 @@ def causes_text(candidates: Sequence[Composition], finding: Finding) -> list[str
 
 
 def explanation_odds(finding: Finding) -> Odds:
-    """Collect the text, probability and fitted model of each reported explanation, the most probable first."""
+    """Collect the text, probability and fitted model of each reported explanation.
+
+    Returns:
+        Explanations, the most probable first.
+    """
     compositions = sorted(finding.reported, key=lambda composition: -composition.probability)
     sentences, fits = list[str](), list[tuple[Model, Covariance] | None]()
     for composition in compositions:

@@ -204,7 +204,11 @@ class Term:
         return shapes / np.abs(shapes * self.unit(model) / self.stiffness(model)).max(axis=-1)[:, None]
 
     def residual(self, value: Array, model: Model) -> Array:
-        """Whitened residuals, (n,), of a model with an added stiffness, `value` (p,) in the unit `measure`."""
+        """Whitened residuals of a model with an added stiffness, `value` (p,) in the unit `measure`.
+
+        Returns:
+            Residuals of all tests and priors, (n,).
+        """
         residuals, added = self.fit.problem.residual(model), value * self.unit(model)
         for test, points in self.tests:
             rows = self.fit.residual_rows[test]

@@ -173,7 +173,11 @@ class GroupSet:
         return [np.stack(arrays) for arrays in zip(*(self._within[n] for n in combinations.tolist()), strict=True)]
 
     def with_modes(self, compound: CompoundDeviation, combinations: Array) -> Array:
-        """Inner products of a deviation's q modes with the columns, (c, q, g), computed once for each combination."""
+        """Inner products of a deviation's q modes with the g columns, computed once for each combination of rig errors.
+
+        Returns:
+            Products, (combinations, q, g).
+        """
         if not len(compound.group.columns):
             return np.zeros((len(combinations), 0, len(self.rows.rows)))
         keys = [(compound, n) for n in combinations.tolist()]

@@ -96,10 +96,13 @@ def _strain_changes(fit: FitResult) -> tuple[Array, Array]:
 
 
 def fast_relaxation(fit: FitResult) -> Array:
-    """Changes of the n whitened residuals, (n,), by a relaxation of the compound that is faster than the tests.
+    """Changes of the n whitened residuals due to a relaxation of the compound that is faster than the tests.
 
     Far below its own frequency, a relaxation is a loss modulus that grows as the frequency, like the phase of a delay.
     At the highest frequency, its loss modulus is here the median modulus |K|/(stiffness per modulus) of the tests.
+
+    Returns:
+        Changes, (n,).
     """
     tests = fit.data_sets
     highest = max(float(test.frequency.max()) for test in tests)

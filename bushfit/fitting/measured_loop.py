@@ -124,8 +124,12 @@ class MeasuredLoop(MeasuredBase):
     def history(self, is_transient: bool) -> History:
         """Displacement without noise that drives the model: one settled cycle of 1024 samples, or the whole record.
 
-        The whole record if it begins at rest, and if `is_transient` (the response of the model changes over the first
-        cycles of a settled motion), unless other cycles precede the loop.
+        Args:
+            is_transient: True if the response of the model changes over the first cycles of a settled motion.
+
+        Returns:
+            The whole record if it begins at rest, or if `is_transient` and no other cycles precede the loop; else one
+            settled cycle.
         """
         is_whole = is_transient and not (self.from_rest or self.has_predecessor)
         extent = self.from_rest, is_whole
@@ -143,9 +147,12 @@ class MeasuredLoop(MeasuredBase):
         return self.histories[extent]
 
     def interpolate_at_rows(self, response: Array) -> Array:
-        """Interpolate a model response at the samples of `history`, (..., samples), to the measured rows, (..., n).
+        """Interpolate a model response at the samples of `history`, (..., samples), to the measured rows.
 
         The mean is subtracted if the fit uses the loop about its mean (`datum`).
+
+        Returns:
+            Response at the rows, (..., n).
         """
         length = response.shape[-1]
         if self.datum is not None and not self.from_rest:
@@ -213,7 +220,11 @@ class MeasuredLoop(MeasuredBase):
         return self.whiten((self.force(model, values) - self.measured_force) * self._per_noise)
 
     def jacobian(self, model: Model, names: Sequence[str]) -> Array:
-        """Derivatives of the whitened residuals with respect to parameter values [SI], (len(names), size); cached."""
+        """Derivatives of the whitened residuals with respect to parameter values [SI]; cached.
+
+        Returns:
+            Derivatives, (len(names), size).
+        """
         if (rows := self._recall("jacobian", model, tuple(names))) is not None:
             return rows
         history = self.history(model.is_transient)

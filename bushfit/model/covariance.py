@@ -75,6 +75,9 @@ class Covariance:
 
         Parameters of the effect `preload` are coefficients of one curve and have no meaning alone. The effect is named
         if the tests do not distinguish all of them together from zero (Wald's test).
+
+        Returns:
+            The sentence.
         """
         curve = self.restricted([name for name in self.names if name.startswith("preload.")])
         names = [name for name in self.names if name not in curve.names and self.half_widths[name] >= abs(values[name])]

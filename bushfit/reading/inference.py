@@ -161,7 +161,16 @@ def name_parallel_spring(roles: dict[str, Column]) -> list[str]:
 
 
 def moves_along(table: Table, first: Column, second: Column) -> bool:
-    """True if a second column records the motion of a displacement at another scale, as an extensometer does."""
+    """True if a second column records the motion of a displacement at another scale, as an extensometer does.
+
+    Args:
+        table: table of the columns.
+        first: column of the displacement.
+        second: column to compare with the displacement.
+
+    Returns:
+        True if the units are compatible, the ranges differ and the values are strongly correlated.
+    """
     if not (first.unit and second.unit and units.is_compatible(second.unit, first.unit)):
         return False
     channels = replace(table, roles={"first": first, "second": second})  # whose cells show the decimal mark

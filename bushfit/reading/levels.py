@@ -25,7 +25,7 @@ CONDITIONS = ("temperature", "preload")
 
 
 @dataclass(frozen=True)
-class Condition:
+class SweepCondition:
     """Temperature or preload of each row of a sweep.
 
     Args:
@@ -52,7 +52,7 @@ class Condition:
         return [np.sort(group) for group in groups]
 
 
-def read_condition(table: Table, role: str, motion: Motion) -> Condition | None:
+def read_condition(table: Table, role: str, motion: Motion) -> SweepCondition | None:
     """Read the temperature or preload of each row of a sweep.
 
     Args:
@@ -81,11 +81,11 @@ def read_condition(table: Table, role: str, motion: Motion) -> Condition | None:
     if role == "temperature" and not kelvin:
         si_column(table, role, Direction.AXIAL)  # raises the error, whatever the direction
     if kelvin:
-        return Condition(column, "degC", kelvin[0] * values + kelvin[1] - CELSIUS, SAME_TEMPERATURE)
-    return Condition(column, column.unit or "", values, _PRELOAD_STEP * float(np.abs(values).max(initial=0.0)))
+        return SweepCondition(column, "degC", kelvin[0] * values + kelvin[1] - CELSIUS, SAME_TEMPERATURE)
+    return SweepCondition(column, column.unit or "", values, _PRELOAD_STEP * float(np.abs(values).max(initial=0.0)))
 
 
-def find_levels(table: Table, condition: Condition, rows: NDArray[np.intp]) -> list[NDArray[np.intp]]:
+def find_levels(table: Table, condition: SweepCondition, rows: NDArray[np.intp]) -> list[NDArray[np.intp]]:
     """Divide the rows of a sweep into tests of one temperature or preload.
 
     Args:

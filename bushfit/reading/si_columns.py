@@ -180,6 +180,9 @@ def column_of(table: Table, heading: Heading, index: int, stated_unit: str | Non
         heading: meaning of the header: role (quantity, such as "force"), unit and convention.
         index: index of the column.
         stated_unit: unit that the user states; None without one.
+
+    Returns:
+        Column with its unit and convention; its numbers are not converted.
     """
     multiple = _MULTIPLE.sub(r"x \g<0>", stated_unit or "")
     from_user, in_row = (parse_unit(text) for text in (multiple, table.layout.units[index]))

@@ -167,7 +167,11 @@ def place_differences(comparison: ComparisonFile) -> dict[str, list[PlaceDiffere
 
 
 def parameter_differences_table(comparison: ComparisonFile) -> pd.DataFrame:
-    """Table of the differences of parameters, parameters.csv: a row per parameter and pair of results."""
+    """Table of the differences of parameters, parameters.csv.
+
+    Returns:
+        A row per parameter and pair of results.
+    """
     rows = [
         {
             "parameter": row.name,
@@ -197,7 +201,11 @@ def differences_table(comparison: ComparisonFile) -> pd.DataFrame:
 
 
 def families_table(families: Sequence[FamilyEntry]) -> pd.DataFrame:
-    """Table of the compared model families, families.csv: a row per family."""
+    """Table of the compared model families, families.csv.
+
+    Returns:
+        A row per family.
+    """
     rows = [
         {
             "label": family.label,

@@ -66,6 +66,9 @@ def predict_tables(
         result: final model.
         tables: tables of the result by file name.
         sweeps: table of the measured sweeps; None without sweeps.
+
+    Returns:
+        Predictions by file name.
     """
     places: list[Place] = [*(Direction if result.model.bushing else ()), *result.specimens]
     predictions = {}
