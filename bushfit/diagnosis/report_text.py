@@ -26,7 +26,7 @@ from bushfit.diagnosis.locate import find_regions
 from bushfit.diagnosis.next_test import deciding_test
 from bushfit.diagnosis.priors import LARGEST_CLOSED_GAP, NAMED
 from bushfit.diagnosis.record import Diagnosis, NamedCause
-from bushfit.diagnosis.rig_shares import rig_alternatives
+from bushfit.diagnosis.rig_shares import with_rig_alternatives
 from bushfit.diagnosis.search import Search
 from bushfit.diagnosis.verdict import LEVELS, NAMELESS, Composition, Finding, decide_verdict
 from bushfit.effects import get_effect, qualified_name
@@ -344,9 +344,7 @@ class DiagnosisWriter:
             fixed=closing.known,
         )
         odds = explanation_odds(self.finding)
-        result = odds.averaged(fitted)
-        if gap:
-            result = replace(result, alternatives=rig_alternatives(result, self.hypotheses, base))
+        result = with_rig_alternatives(odds.averaged(fitted), self.hypotheses, base)
         amounts = filter(None, (_format_amount(entry.name, result) for entry in entries))
         rest = [f"the rest: {' and '.join(remainder)}"] if remainder else []
         return Diagnosis(

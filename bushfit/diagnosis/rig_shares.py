@@ -26,22 +26,24 @@ _LEAST = 0.01
 _ITERATIONS = 3
 
 
-def rig_alternatives(result: Result, hypotheses: Sequence[Hypothesis], base: FitResult) -> tuple[Alternative, ...]:
-    """List models in which effects of the rig are a part of what the smooth correction of a result contains.
+def with_rig_alternatives(result: Result, hypotheses: Sequence[Hypothesis], base: FitResult) -> Result:
+    """Add the models in which effects of the rig are a part of what the smooth correction of a result contains.
 
     A correction closes the gap between model and tests, whatever its cause. Effects of the rubber and the component
     stay in the car and are predicted well by the correction; effects of the rig do not. So hypotheses are grouped by
     their effects of the rig, and each group gives one model with the measured stiffness of the result.
 
     Args:
-        result: result whose model has a smooth correction.
+        result: result; unchanged if its model has no smooth correction.
         hypotheses: all hypotheses about the gap.
         base: starting model, fitted to the tests.
 
     Returns:
-        Alternatives with their probabilities. The rest to 1 is the probability that the rig has the effects of the
-        result's model and no others.
+        The result with these alternatives and their probabilities. The rest to 1 is the probability that the rig has
+        the effects of the result's model and no others.
     """
+    if not result.model.unnamed:
+        return result
     shares = softmax([hypothesis.log_posterior for hypothesis in hypotheses]).tolist()
     probability, members = (
         defaultdict[frozenset[str], float](float),
@@ -67,7 +69,7 @@ def rig_alternatives(result: Result, hypotheses: Sequence[Hypothesis], base: Fit
         kept = result.covariance.restricted([name for name in model.values if name not in names])
         matrix = block_diag(kept.matrix, known.matrix)
         alternatives.append(Alternative(corrected, share, Covariance((*kept.names, *known.names), matrix)))
-    return tuple(alternatives)
+    return replace(result, alternatives=tuple(alternatives))
 
 
 def _of_rig(names: Iterable[str]) -> frozenset[str]:
