@@ -117,7 +117,7 @@ def test_the_family_that_made_the_tests_is_the_best_and_known_to_be(paper_model,
         for key, value in TRUTHS[truth].items():
             assert values[f"{truth}.{key}"] == pytest.approx(value, rel=0.1)
     else:
-        assert "alike" in found["intrinsic_time"].words
+        assert "equal" in found["intrinsic_time"].words
         assert found["kraus"].words.endswith("worse by more than chance")
 
 
