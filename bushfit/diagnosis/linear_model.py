@@ -300,7 +300,10 @@ class LinearModel:
         groups = GroupSet((Group(rows, np.eye(len(rows)), act_together=True),), self.rig)
         alone = replace(self, jacobian=self.jacobian[:0], precision=self.precision[:0], groups=groups).products
         wide = np.append(self.precision, np.square(_SMALL / SIZES[-1]))
-        covariance = np.linalg.inv(alone.grams[0][:, 0] + np.diag(wide))
+        seen = np.einsum("kn,kn->k", rows, rows) + wide
+        scale = np.sqrt(np.where(seen > 0.0, seen, 1.0))
+        information = (alone.grams[0][:, 0] + np.diag(wide)) / np.outer(scale, scale)
+        covariance = np.linalg.inv(information + _ROUNDING * np.eye(scale.size)) / np.outer(scale, scale)
         shift = np.einsum("nij,nj->ni", covariance, alone.projections[0][:, 0])
         amount, variance, along = shift[:, -1:], covariance[:, -1, -1:], covariance[:, :, -1]
         total = variance + np.square(SIZES) * (self.deviations > 0.0)[:, None]  # (cases, sizes)

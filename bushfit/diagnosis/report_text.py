@@ -44,8 +44,6 @@ _ONE_DIRECTION = (
     "one direction was tested: a deviation of the compound and a smooth fault of the rig cannot be distinguished; test "
     "another direction or specimen"
 )
-#: Probability above which the next step is to correct the record: such a mistake is more probable than not.
-_LIKELY = 0.5
 #: Advice if levels disagree by more than the class of the rig.
 _LEVELS_ADVICE = "measure the levels again in another session, or state the class of the rig (gain_error under [rig])"
 
@@ -267,7 +265,7 @@ class DiagnosisWriter:
         Args:
             leader: most probable explanation with causes.
         """
-        if (claim := leader.best.claim) and leader.probability > _LIKELY:
+        if (claim := leader.best.claim) and leader is self.first:
             return f"check the records of the tests; {'; '.join(claim.corrections)}"
         fitted = [c for c in self.finding.reported if c.best.effects and c.best.refitted]
         models, odds = [c.best.state.fit.model for c in fitted], [c.probability for c in fitted]
