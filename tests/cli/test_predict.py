@@ -72,6 +72,7 @@ def test_predict_lays_measurements_over_takes_grids_and_shows_at_most_eight_ampl
     assert measured["measured over model [-]"].between(0.95, 1.05).all()
     axial, radial = (line for line in done.stderr.splitlines() if ": expected error " in line)
     assert (axial.endswith("all fitted)"), radial.endswith("each predicted by a fit without it)")) == (True, True)
+    assert 0.3 < float(axial.partition(": expected error ")[2].split()[0]) < 3.0, "in per cent"
     table = pd.read_csv(tmp_path / "x" / "axial.csv")
     assert table["frequency [Hz]"].tolist() == [10, 20, 30] * 2
     assert table["amplitude [mm]"].tolist() == [0.1] * 3 + [0.3] * 3
