@@ -166,11 +166,19 @@ class SearchState:
         return self.hypotheses[0].key
 
     @cached_property
+    def has_influence(self) -> Array:
+        """Mask of the fit's parameters that change the predicted tests and are not at an end of a shape's range.
+
+        A parameter changes nothing if an effect replaces the branch on which it acts.
+        """
+        precision = np.array([self.precision.get(name, 0.0) for name in self.bare.names])
+        return np.isfinite(precision) & self.bare.jacobian.any(axis=1)
+
+    @cached_property
     def linear(self) -> LinearModel:
         """Residuals linearised at the fit, from which the evidence is computed for each noise case of the rig."""
-        tests, bare = self.tests, self.bare
+        tests, bare, moves = self.tests, self.bare, self.has_influence
         precision = np.array([self.precision.get(name, 0.0) for name in bare.names])
-        moves = np.isfinite(precision)
         of_faulty_parts = [np.full(len(p.columns), x**-2) for p, x in zip(self.faulty_parts, self.amounts, strict=True)]
         rows = np.concatenate([bare.jacobian[moves], *(part.columns for part in self.faulty_parts)])
         precision = np.concatenate([precision[moves], *of_faulty_parts])
@@ -234,7 +242,7 @@ class SearchState:
         group = compound(bare, MAXIMUM_NODES)
         deviation = CompoundDeviation(group, self.tests.errors) if group else None
         linear = replace(self.linear, compound=deviation, chosen_cases=self._likely_cases)
-        moves = np.isfinite([self.precision.get(name, 0.0) for name in bare.names])
+        moves = self.has_influence
         slopes, count = bare.coordinates.slopes(values)[moves], np.count_nonzero(moves)
         names = tuple(np.array(bare.names)[moves].tolist())
         mean, covariance = linear.parameters(fast_relaxation(bare))

@@ -13,9 +13,11 @@ from rigged import LEVELS, SHARED, both, loop_too_strong, off
 from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.explanations import Explanation
 from bushfit.diagnosis.faulty_parts import find_faulty_parts, is_pattern
+from bushfit.diagnosis.hypotheses import SearchState
 from bushfit.diagnosis.linear_model import LinearModel
 from bushfit.diagnosis.projected_columns import GroupSet
 from bushfit.diagnosis.propose import proposals
+from bushfit.diagnosis.recorded_tests import RecordedTests
 from bushfit.diagnosis.rig_errors import in_scatter_units, rig_errors
 from bushfit.diagnosis.smooth_deviations import compound_shapes
 from bushfit.effects import BASE, LIBRARY
@@ -88,3 +90,15 @@ def test_the_compound_bends_a_loop_in_odd_overtones_and_in_the_first_cycle(bare)
     assert len(rested) == 6
     assert np.median(np.abs(rested[:, phase >= 1.0])) < 1e-9
     np.testing.assert_allclose(np.abs(rested).max(axis=1), 1.0 / (3.0 * np.arange(1, 7)), rtol=0.01)
+
+
+def test_a_parameter_without_influence_is_left_out(measured, fitted):
+    """The effect of preload changes no test without a preload; intervals of the others exist as without it."""
+    names = []
+    for effects in ((), ("preload",)):
+        state = SearchState.of_tests(RecordedTests(fitted(measured(plan=SHARED), *effects), SHARED_RIG, (), 0.0))
+        means, covariance = state.parameters
+        names.append(covariance.names)
+        assert np.isfinite(covariance.matrix).all()
+        assert set(means) == set(covariance.names)
+    assert names[0] == names[1]
