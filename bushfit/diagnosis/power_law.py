@@ -252,16 +252,13 @@ class Term:
 def nearest_power_law(
     fitted: FitResult, rig: RigSettings, start: Mapping[str, float], bounds: Bounds
 ) -> PowerLaw | None:
-    """Estimate the power law nearest to the gap of a fitted model.
+    """Estimate the power law nearest to the gap of a fitted model; None if the tests show none.
 
     Args:
         fitted: the fitted model and the tests.
         rig: stated accuracy class of the rig (gain and phase errors).
         start: starting values estimated from the data, because the gap may distort the fitted values.
         bounds: limits of parameters inside their general limits.
-
-    Returns:
-        The power law; None if the tests show none.
     """
     bare, model = in_scatter_units(fitted), fitted.model
     begun = model.with_values({name: value for name, value in start.items() if name in model.values})
