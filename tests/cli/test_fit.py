@@ -134,6 +134,15 @@ def test_held_parameters_that_miss_the_tests_are_said_to(own):
     assert "every parameter is fixed" in typing(own)("diagnose", CAMPAIGN, "-o", "y", "--no-plots", status=2).stderr
 
 
+def test_tests_are_no_prior_of_themselves(own):
+    typing(own)("fit", CAMPAIGN, "-o", "x", "--no-plots")
+    with (own / CAMPAIGN).open("a", encoding="utf-8") as campaign:
+        campaign.write('\n[fit]\nprior = "../x/model.json"\n')
+    refused = typing(own)("fit", CAMPAIGN, "-o", "y", "--no-plots", status=2).stderr
+    assert "the prior was fitted to tests of this campaign" in refused
+    assert "loop_axial_1.csv" in refused
+
+
 def test_a_wrong_unit_is_the_headline(own):
     sweep = pd.read_csv(own / SWEEP)
     sweep["stiffness [N/mm]"] *= 1000.0
