@@ -300,8 +300,7 @@ class LinearModel:
         groups = GroupSet((Group(rows, np.eye(len(rows)), act_together=True),), self.rig)
         alone = replace(self, jacobian=self.jacobian[:0], precision=self.precision[:0], groups=groups).products
         wide = np.append(self.precision, np.square(_SMALL / SIZES[-1]))
-        seen = np.einsum("kn,kn->k", rows, rows) + wide
-        scale = np.sqrt(np.where(seen > 0.0, seen, 1.0))
+        scale = np.sqrt(np.einsum("kn,kn->k", rows, rows) + wide)
         information = (alone.grams[0][:, 0] + np.diag(wide)) / np.outer(scale, scale)
         covariance = np.linalg.inv(information + _ROUNDING * np.eye(scale.size)) / np.outer(scale, scale)
         shift = np.einsum("nij,nj->ni", covariance, alone.projections[0][:, 0])
