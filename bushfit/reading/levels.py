@@ -61,10 +61,11 @@ def read_condition(table: Table, role: str, motion: Motion) -> SweepCondition | 
         motion: kind of motion, which determines the unit of a preload.
 
     Returns:
-        The values; None without a column, without a fitting unit, or with a cell that is not a number.
+        The values; None without a column, with a cell that is not a number, for one temperature without a unit, and for
+        a preload without a fitting unit.
 
     Raises:
-        UnitError: several temperatures without a unit.
+        MeasurementError: temperatures in an unknown unit, or several temperatures without a unit.
     """
     if (column := table.roles.get(role)) is None:
         return None
@@ -76,7 +77,7 @@ def read_condition(table: Table, role: str, motion: Motion) -> SweepCondition | 
     found = ([way.value(text) for way in notations] for text in texts.distinct)
     distinct = [next((value for value in pair if value is not None), np.nan) for pair in found]
     values = np.array(distinct, dtype=float)[texts.codes]
-    if np.isnan(values).any() or (role == "temperature" and not kelvin and np.ptp(values) <= ONE_TEST):
+    if np.isnan(values).any() or (role == "temperature" and not column.unit and np.ptp(values) <= ONE_TEST):
         return None
     if role == "temperature" and not kelvin:
         si_column(table, role, Direction.AXIAL)  # raises the error, whatever the direction
