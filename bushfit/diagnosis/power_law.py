@@ -36,8 +36,7 @@ from bushfit.model.covariance import Z95
 from bushfit.model.model import Model
 from bushfit.units import number
 
-#: Unit of the added stiffness: N/m (or N m/rad) over displacement, Pa over strain, or a ratio to the model's stiffness
-#: over strain.
+#: Unit of the added stiffness: N/m or N m/rad over displacement, Pa over strain, or a share of the model's stiffness.
 Measure = Literal["stiffness", "modulus", "gain"]
 #: A value and the ends of its 95 % interval.
 Interval = tuple[float, float, float]
@@ -48,8 +47,7 @@ _NEAR = 3.0
 _LARGEST_POWER = 4.0
 #: Number of powers along each axis of the grid, and half width of the grid about the likeliest pair [standard errors].
 _GRID, _REACH = 13, 4.0
-#: Maximum number of iterations of the grid and the model's parameters, and the change of a power, in standard errors,
-#: below which the iteration has converged.
+#: Largest number of iterations, and the change of a power, in standard errors, at which they have converged.
 _ROUNDS, _RESTS = 20, 0.1
 #: Longest step of a parameter in one iteration, and its least distance from its limits, in fitting coordinates.
 _LONGEST, _INSIDE = 1.0, 1e-6
@@ -252,13 +250,16 @@ class Term:
 def nearest_power_law(
     fitted: FitResult, rig: RigSettings, start: Mapping[str, float], bounds: Bounds
 ) -> PowerLaw | None:
-    """Estimate the power law nearest to the gap of a fitted model; None if the tests show none.
+    """Estimate the power law nearest to the gap of a fitted model.
 
     Args:
         fitted: the fitted model and the tests.
         rig: stated accuracy class of the rig (gain and phase errors).
         start: starting values estimated from the data, because the gap may distort the fitted values.
         bounds: limits of parameters inside their general limits.
+
+    Returns:
+        The law, with intervals; None if the tests show none.
     """
     bare, model = in_scatter_units(fitted), fitted.model
     begun = model.with_values({name: value for name, value in start.items() if name in model.values})
@@ -272,8 +273,8 @@ def nearest_power_law(
     if not grids or grids[0].log_evidence < grids[0].linear.evidence.log_evidence:
         return None
     log_ratios = np.array([grid.log_evidence - grids[0].log_evidence for grid in grids])
-    others = zip(grids[1:], -log_ratios[1:], strict=True)
-    alternatives = tuple(grid.measure for grid, loss in others if loss < 0.5 * DECISIVE_CHI_SQUARE)
+    others = zip(grids[1:], log_ratios[1:], strict=True)
+    alternatives = tuple(grid.measure for grid, gain in others if gain > -0.5 * DECISIVE_CHI_SQUARE)
     counts = np.round(_DRAWS * np.exp(log_ratios)).astype(int).tolist()
     draws = np.concatenate([grid.draws(count) for grid, count in zip(grids, counts, strict=True)], axis=-1)
     middle = np.angle(np.exp(1j * draws[0]).mean())

@@ -4,11 +4,13 @@ Harmonics are fitted by least squares at the recorded rows, without outliers.
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from bushfit.effects.contract import Array
+from bushfit.effects.history import History
 from bushfit.fitting.outliers import NEIGHBOURS, are_outliers, are_stuck, outlier_limit
 from bushfit.fitting.repeats import FLOOR
 from bushfit.reading.measurement import Loop
@@ -33,6 +35,9 @@ _SLOW_HARMONICS = 3
 _TRIANGLE_RATIO = 1.02
 #: Share of the amplitude, over the number of harmonics, by which these may miss a corner of the motion.
 _CORNER = 0.5
+#: How far equations over a loop's motion may be from solved, relative to it: a ten-thousandth of the noise of the best
+#: rigs. Derivatives are resolved apart from that.
+_ACCURACY = 1e-8
 
 
 class OutlierRows(NamedTuple):
@@ -59,6 +64,27 @@ class LoopHarmonics(NamedTuple):
     force: Array
     force_noise: float
     outliers: Mapping[str, OutlierRows]
+
+
+def driving_motion(coefficients: Array, frequency: float, cycles: float, *, from_rest: bool) -> History:
+    """Displacement without noise that drives the model of a loop, with 1024 samples per cycle.
+
+    Args:
+        coefficients: complex harmonics of the displacement, mean first [m or rad].
+        frequency: frequency [Hz].
+        cycles: number of cycles; whole unless the motion starts from rest.
+        from_rest: True for a motion that starts from rest at zero, False for a settled one.
+
+    Returns:
+        The motion over time [m or rad].
+    """
+    motion = np.fft.irfft(0.5 * GRID * np.append(0.0, coefficients[1:]), GRID)
+    if from_rest:
+        motion = np.resize(motion - motion[0], int(np.ceil(cycles * GRID)) + 2)
+        history = History(motion, 1.0 / (frequency * GRID), periodic=False, frequency=frequency)
+    else:
+        history = History.steady(np.tile(motion, int(cycles)), frequency, cycles=int(cycles))
+    return replace(history, accuracy=_ACCURACY)
 
 
 def loop_harmonics(loop: Loop, frequency: float, cycles: float, *, from_rest: bool = False) -> LoopHarmonics:

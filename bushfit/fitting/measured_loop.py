@@ -1,5 +1,6 @@
 """One measured loop with its noise: force against time, the measured displacement driving the model."""
 
+import math
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -9,7 +10,7 @@ import numpy as np
 
 from bushfit.effects.contract import Array, RubberConditions, Values
 from bushfit.effects.history import History
-from bushfit.fitting.loop_harmonics import GRID, SMOOTH_HARMONICS, OutlierRows
+from bushfit.fitting.loop_harmonics import GRID, SMOOTH_HARMONICS, OutlierRows, driving_motion
 from bushfit.fitting.measured_test import MeasuredBase
 from bushfit.fitting.row_noise import RowNoise
 from bushfit.fitting.shared_errors import SharedErrors
@@ -24,9 +25,6 @@ from bushfit.reduction.harmonics import as_complex, basis, least_squares
 _ERROR_HARMONICS = 25
 _ERROR_SIZES = 1.0 / np.maximum(np.arange(1.0, _ERROR_HARMONICS + 1.0), SMOOTH_HARMONICS)
 _ERROR_SIZES /= np.linalg.norm(_ERROR_SIZES)
-#: How far equations over a loop's motion may be from solved, relative to it: a ten-thousandth of the noise of the best
-#: rigs. Derivatives are resolved apart from that.
-_ACCURACY = 1e-8
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -134,16 +132,10 @@ class MeasuredLoop(MeasuredBase):
         is_whole = is_transient and not (self.from_rest or self.has_predecessor)
         extent = self.from_rest, is_whole
         if extent not in self.histories:
-            frequency = float(self.frequency[0])
-            motion = np.fft.irfft(0.5 * GRID * np.append(0.0, self.coefficients[1:]), GRID)
-            if self.from_rest:
-                motion = np.resize(motion - motion[0], int(np.ceil(self.cycles * GRID)) + 2)
-                history = History(motion, 1.0 / (frequency * GRID), periodic=False, frequency=frequency)
-            else:
-                half_row = 0.5 * self.cycles / self.test.time.size
-                count = int(np.ceil(self.cycles - half_row)) if is_whole else 1
-                history = History.steady(np.tile(motion, count), frequency, cycles=count)
-            self.histories[extent] = replace(history, accuracy=_ACCURACY)
+            half_row = 0.5 * self.cycles / self.test.time.size
+            settled = math.ceil(self.cycles - half_row) if is_whole else 1
+            cycles, frequency = self.cycles if self.from_rest else settled, float(self.frequency[0])
+            self.histories[extent] = driving_motion(self.coefficients, frequency, cycles, from_rest=self.from_rest)
         return self.histories[extent]
 
     def interpolate_at_rows(self, response: Array) -> Array:
