@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import reduce
 
 import numpy as np
 
@@ -30,11 +31,11 @@ from bushfit.diagnosis.rig_shares import with_rig_alternatives
 from bushfit.diagnosis.search import Search
 from bushfit.diagnosis.verdict import LEVELS, NAMELESS, Composition, Finding, decide_verdict
 from bushfit.effects import get_effect, qualified_name
-from bushfit.effects.mistakes import get_candidate
 from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.fitting.preparation import split_by_kind, with_gain_weighting
 from bushfit.fitting.problem import FitResult
 from bushfit.model.covariance import Covariance
+from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.units import display_unit, format_aligned, number
 
@@ -260,7 +261,7 @@ class DiagnosisWriter:
         return [c for c in self.finding.reported if c.probability > 1.0 - NAMED and c.causes]
 
     def _deciding_advice(self, leader: Composition) -> str:
-        """Advice on the test that separates the possible causes, or that tells the bushing from the rig.
+        """Advice on the test that separates the possible causes; an effect with a twin may be in the rig as well.
 
         Args:
             leader: most probable explanation with causes.
@@ -268,11 +269,15 @@ class DiagnosisWriter:
         if (claim := leader.best.claim) and leader is self.first:
             return f"check the records of the tests; {'; '.join(claim.corrections)}"
         fitted = [c for c in self.finding.reported if c.best.effects and c.best.refitted]
-        models, odds = [c.best.state.fit.model for c in fitted], [c.probability for c in fitted]
+        models, odds = list[Model](), list[float]()
+        for composition in fitted:
+            places = [composition.best.state.fit.model]
+            twins = [twin for name in composition.best.effects for twin in get_effect(name).twins[:1]]
+            places += [reduce(Model.with_twin, twins, places[0])] if twins else []
+            models += places
+            odds += [composition.probability / len(places)] * len(places)
         advice = deciding_test(models, odds, self.search.base.data_sets, self.search.data.campaign.rig)
-        leads = [name for name in self.finding.leads if get_candidate(name).twins]
-        confirmed = [*leads, *(() if advice else leader.names)]
-        return get_effect(confirmed[0]).confirmed_by if confirmed else advice
+        return advice or (get_effect(leader.names[0]).confirmed_by if leader.names else "")
 
     def _record_entries(self, composition: Composition, alternatives: tuple[str, ...] = ()) -> list[NamedCause]:
         """List the reported entries for the mistake in the record of an explanation, one for each affected test.
