@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from scipy.special import logsumexp, ndtr
+from scipy.special import ndtr, softmax
 
 from bushfit.diagnosis.fits import fit_model
 from bushfit.diagnosis.holdout import HoldOut, Predicted, hold_out_parts, predicted_parts
@@ -148,8 +148,7 @@ def fit_families(
             chains[name] = _chain(chains, first, name, fixed, bounds)
     effects = {name: [] if name == base_name else name.split("+") for name in chains}
     worth = {name: _log_evidence(chain, effects[name], bounds) for name, chain in chains.items()}
-    odds = np.exp(np.array([*worth.values()]) - logsumexp([*worth.values()]))
-    probability = dict(zip(worth, odds.tolist(), strict=True))
+    probability = dict(zip(worth, softmax([*worth.values()]).tolist(), strict=True))
     alternatives = sorted((name for name in worth if name != base_name), key=worth.__getitem__, reverse=True)
     likely = [name for name in alternatives if names or probability[name] >= _LIKELY] or alternatives[:1]
     reported, found = {base_name, *(likely if names else likely[:_MOST])}, []

@@ -27,8 +27,7 @@ from bushfit.diagnosis.projected_columns import CompoundDeviation, GroupSet, Rig
 from bushfit.diagnosis.rig_errors import RigErrors
 from bushfit.effects.contract import Array
 
-#: Information added to each parameter, relative to its own, so that the matrix of undetermined parameters has an
-#: inverse.
+#: Information added to each parameter, relative to its own, so that undetermined parameters leave it an inverse.
 _ROUNDING = 1e-9
 #: Posterior weight of a noise case below which it changes no mean: rounding.
 _NEGLIGIBLE = 1e-15
@@ -146,26 +145,22 @@ class LinearModel:
         grown = 1.0 + variance * compound.modes[0][self.combinations]
         shrinkage = variance / grown  # of the products with each mode
         gram = gram[index] - (modes[..., : flat.stop] * shrinkage[..., None]).swapaxes(1, 2) @ modes
-        by_noise = np.einsum("kn,kn->k", self.jacobian, self.jacobian)
-        scale = np.sqrt(np.maximum(by_noise + self.precision, np.finfo(float).tiny))
-        information = gram[:, flat, flat] + np.diag(self.precision)
-        root = np.linalg.cholesky(information / np.outer(scale, scale) + _ROUNDING * np.eye(scale.size))
-        inverse = np.linalg.inv(root) / scale
-        free = inverse @ gram[:, flat]
-        residual = gram[:, 0] - np.einsum("nk,nkc->nc", free[..., 0], free)
-        parameters = np.einsum("nkj,nk->nj", inverse, free[..., 0])
+        scale, information = _scale_information(gram[:, flat, flat], self.jacobian, self.precision)
+        root, others = np.linalg.cholesky(information), np.delete(gram, flat, axis=-1)  # of the residuals and groups
+        free = np.linalg.solve(root, others[:, flat] / scale[:, None])
+        residual = others[:, 0] - np.einsum("nk,nkc->nc", free[..., 0], free)
+        parameters = np.linalg.solve(information, others[:, flat, :1] / scale[:, None])[..., 0] / scale
         deviation = shrinkage * (modes[..., 0] - np.einsum("nqk,nk->nq", modes[..., flat], parameters))
         log_det = rig.roots[1][self.combinations] + np.sum(np.log(grown), axis=1)
         log_det += 2.0 * np.sum(np.log(np.einsum("nkk->nk", root) * scale), axis=1)
         log_det -= np.sum(np.log(self.precision[has_prior]))
         projections, projected = [], []
         for (_, columns), products in zip(groups.blocks, groups.within(used), strict=True) if groups else ():
-            rows = flat.stop + columns
-            absorbed = np.moveaxis(free[..., rows], 1, -1)  # (cases, blocks, width, k)
-            smooth = np.moveaxis(modes[..., rows], 1, -1)
+            absorbed = np.moveaxis(free[..., 1 + columns], 1, -1)  # (cases, blocks, width, k)
+            smooth = np.moveaxis(modes[..., flat.stop + columns], 1, -1)
             products = products[index] - (smooth * shrinkage[:, None, None]) @ smooth.swapaxes(-1, -2)
             projected.append(products - absorbed @ absorbed.swapaxes(-1, -2))
-            projections.append(residual[:, rows])
+            projections.append(residual[:, 1 + columns])
         base = np.array([rig.cases[n].log_weight for n in self.cases]) - 0.5 * (residual[:, 0] + log_det)
         return Products(base, residual[:, 0], deviation, projections, projected)
 
@@ -244,10 +239,7 @@ class LinearModel:
 
     @property
     def log_evidence_with_level_errors(self) -> float:
-        """Natural log of the tests' marginal likelihood if only rig errors of levels exceed the stated accuracy.
-
-        A level is the set of all points at one constant amplitude, or frequency, of a sweep.
-        """
+        """Natural log of the evidence if only rig errors of levels, see `priors.LEVELS`, exceed the stated accuracy."""
         return _log_sum(self.products.base[~self._is_plain & (self.deviations == 0.0)])
 
     def likely_cases(self, far: float) -> Array:
@@ -261,7 +253,7 @@ class LinearModel:
             with the same rig errors and a deviation, or the case with one of `groups` added, is within `far` of the
             best.
         """
-        plain, index = self._is_plain, self.rig.combinations[1][self.cases]
+        plain, index = self._is_plain, self.combinations
         base = np.where(plain | (self.deviations > 0.0), self.products.base, -np.inf)
         best = np.full(index.max() + 1, -np.inf)
         np.maximum.at(best, index, base)
@@ -300,9 +292,8 @@ class LinearModel:
         groups = GroupSet((Group(rows, np.eye(len(rows)), act_together=True),), self.rig)
         alone = replace(self, jacobian=self.jacobian[:0], precision=self.precision[:0], groups=groups).products
         wide = np.append(self.precision, np.square(_SMALL / SIZES[-1]))
-        scale = np.sqrt(np.einsum("kn,kn->k", rows, rows) + wide)
-        information = (alone.grams[0][:, 0] + np.diag(wide)) / np.outer(scale, scale)
-        covariance = np.linalg.inv(information + _ROUNDING * np.eye(scale.size)) / np.outer(scale, scale)
+        scale, information = _scale_information(alone.grams[0][:, 0], rows, wide)
+        covariance = np.linalg.inv(information) / np.outer(scale, scale)
         shift = np.einsum("nij,nj->ni", covariance, alone.projections[0][:, 0])
         amount, variance, along = shift[:, -1:], covariance[:, -1, -1:], covariance[:, :, -1]
         total = variance + np.square(SIZES) * (self.deviations > 0.0)[:, None]  # (cases, sizes)
@@ -339,6 +330,21 @@ class LinearModel:
         mean = np.einsum("ns,nsi->i", share, means)
         spread = np.einsum("nij,nj,nkj->ik", vectors, np.einsum("ns,nsj->nj", share, variances), vectors)
         return mean, spread + np.einsum("ns,nsi,nsj->ij", share, means - mean, means - mean)
+
+
+def _scale_information(grams: Array, rows: Array, precision: Array) -> tuple[Array, Array]:
+    """Scale the information on k parameters to a diagonal near 1, and make it invertible.
+
+    Args:
+        grams: inner products of the rows in each noise case, (cases, k, k).
+        rows: derivatives of the residuals with respect to the parameters, (k, n).
+        precision: prior precision of each parameter, (k,).
+
+    Returns:
+        Scale of each parameter, (k,), and the scaled information, (cases, k, k).
+    """
+    scale = np.sqrt(np.maximum(np.einsum("kn,kn->k", rows, rows) + precision, np.finfo(float).tiny))
+    return scale, (grams + np.diag(precision)) / np.outer(scale, scale) + _ROUNDING * np.eye(scale.size)
 
 
 def _log_sum(values: Array) -> float:

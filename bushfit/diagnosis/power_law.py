@@ -18,7 +18,7 @@ from math import log
 from typing import Literal
 
 import numpy as np
-from scipy.special import logsumexp
+from scipy.special import logsumexp, softmax
 
 from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.explanations import Group
@@ -311,7 +311,7 @@ class _Grid:
     @property
     def share(self) -> Array:
         """Posterior probability of each of the g pairs of powers of frequency and amplitude, (g,)."""
-        return np.exp(self.log_evidences - logsumexp(self.log_evidences))
+        return np.asarray(softmax(self.log_evidences))
 
     @property
     def log_evidence(self) -> float:

@@ -271,11 +271,11 @@ class DiagnosisWriter:
         fitted = [c for c in self.finding.reported if c.best.effects and c.best.refitted]
         models, odds = list[Model](), list[float]()
         for composition in fitted:
-            places = [composition.best.state.fit.model]
+            model = composition.best.state.fit.model
             twins = [twin for name in composition.best.effects for twin in get_effect(name).twins[:1]]
-            places += [reduce(Model.with_twin, twins, places[0])] if twins else []
-            models += places
-            odds += [composition.probability / len(places)] * len(places)
+            versions = [model, reduce(Model.with_twin, twins, model)] if twins else [model]
+            models += versions
+            odds += [composition.probability / len(versions)] * len(versions)
         advice = deciding_test(models, odds, self.search.base.data_sets, self.search.data.campaign.rig)
         return advice or (get_effect(leader.names[0]).confirmed_by if leader.names else "")
 

@@ -142,7 +142,12 @@ def in_scatter_units(fit: FitResult) -> FitResult:
 
 
 def rig_errors(fit: FitResult, rig: RigSettings) -> RigErrors:
-    """Errors of a rig in the fitted tests, at the sizes of the accuracy class that [rig] states."""
+    """Build the errors of a rig that points of the fitted tests share, with their possible sizes.
+
+    Args:
+        fit: the fitted model and the tests, with residuals in units of the scatter from point to point.
+        rig: accuracy class that [rig] states; its gain error (relative) and phase error [rad] set the size of an error.
+    """
     return RigErrors(list(error_blocks(fit, rig)), noise_cases(fit))
 
 

@@ -45,10 +45,8 @@ def with_rig_alternatives(result: Result, hypotheses: Sequence[Hypothesis], base
     if not result.model.unnamed:
         return result
     shares = softmax([hypothesis.log_posterior for hypothesis in hypotheses]).tolist()
-    probability, members = (
-        defaultdict[frozenset[str], float](float),
-        defaultdict[frozenset[str], list[Hypothesis]](list),
-    )
+    probability: dict[frozenset[str], float] = defaultdict(float)
+    members: dict[frozenset[str], list[Hypothesis]] = defaultdict(list)
     for hypothesis, share in zip(hypotheses, shares, strict=True):
         effects = _of_rig(hypothesis.effects)
         probability[effects] += share

@@ -244,7 +244,8 @@ def needs_option(file: Path, key: str, role: str, test_options: Mapping[str, Any
         test_options: options of the test.
 
     Returns:
-        True if the file has the stated column, or the column lacks a unit; None if the file cannot be read.
+        For "columns", True if the file has the stated column; for "units", True if the header of the column states no
+        unit. False if not, and None if the file cannot be read or has no column of this role.
     """
     names = LOOP_COLUMNS if role in LOOP_COLUMNS else SWEEP_COLUMNS
     columns = {role: test_options["columns"][role]} if key == "columns" else test_options["columns"]
