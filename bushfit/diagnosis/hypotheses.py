@@ -335,7 +335,7 @@ def mean_parameters(hypotheses: Sequence[Hypothesis], names: Sequence[str]) -> t
     states = [hypotheses[n].state for n in near]
     pairs = [({**state.fit.model.values, **state.parameters[0]}, state.parameters[1]) for state in states]
     means = np.array([[values[name] for name in names] for values, _ in pairs])
-    mean = weights @ means
+    mean = np.clip(weights @ means, means.min(axis=0), means.max(axis=0))  # rounding may leave their range
     matrix = np.einsum("n,ni,nj->ij", weights, means - mean, means - mean)
     for weight, (_, covariance) in zip(weights, pairs, strict=True):
         known = covariance.restricted(names)

@@ -5,6 +5,7 @@ Scores of effects are what a linear refit would gain.
 
 from collections.abc import Sequence
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from rigged import LEVELS, SHARED, both, loop_too_strong, off
 from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.explanations import Explanation
 from bushfit.diagnosis.faulty_parts import find_faulty_parts, is_pattern
-from bushfit.diagnosis.hypotheses import SearchState
+from bushfit.diagnosis.hypotheses import SearchState, mean_parameters
 from bushfit.diagnosis.linear_model import LinearModel
 from bushfit.diagnosis.projected_columns import GroupSet
 from bushfit.diagnosis.propose import proposals
@@ -23,6 +24,7 @@ from bushfit.diagnosis.smooth_deviations import compound_shapes
 from bushfit.effects import BASE, LIBRARY
 from bushfit.fitting.preparation import split_by_kind
 from bushfit.fitting.problem import FitResult
+from bushfit.model.covariance import Covariance
 
 SHARED_RIG = RigSettings(gain_error=4e-3, phase_error=3.5e-3)
 
@@ -102,3 +104,14 @@ def test_a_parameter_without_influence_is_left_out(measured, fitted):
         assert np.isfinite(covariance.matrix).all()
         assert set(means) == set(covariance.names)
     assert names[0] == names[1]
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_the_mean_of_values_at_a_limit_is_inside_it(seed):
+    """Weights that sum to 1 but for rounding must not give a value that a model refuses."""
+    covariance = Covariance(("loop_clock.rate",), np.zeros((1, 1)))
+    fit = SimpleNamespace(model=SimpleNamespace(values={}))
+    state = SimpleNamespace(fit=fit, parameters=({"loop_clock.rate": -7.0}, covariance))
+    posteriors = np.random.default_rng(seed).normal(size=3)
+    hypotheses = [SimpleNamespace(log_posterior=value, state=state) for value in posteriors]
+    assert mean_parameters(hypotheses, ["loop_clock.rate"])[0] == {"loop_clock.rate": -7.0}
