@@ -25,7 +25,7 @@ from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS
 from bushfit.reading.instruments import word_for_part
 from bushfit.reading.labelled import same_text
 from bushfit.reading.layout import FileFormat
-from bushfit.reading.levels import split_conditions
+from bushfit.reading.levels import CONDITIONS, split_conditions
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.reading.names import NO_LABELS, Labels, labels_above, labels_in_names
 from bushfit.reading.parts import open_file
@@ -183,13 +183,15 @@ def split_rows(source: TestSource) -> tuple[list[TestSource], list[str]]:
             if np.all(np.diff(time) > 0.0):
                 del columns["run"]
         labels = list(zip(*(texts for _, texts in columns.values()), strict=True))
-        rows_of = {row: np.flatnonzero([label == row for label in labels]) for row in dict.fromkeys(labels)}
-        if is_sweep and not columns:
-            rows_of = {(): np.arange(sum(1 for _ in table.rows()))}
-        conditions = {row: split_conditions(table, rows, test_options, table.motion) for row, rows in rows_of.items()}
+        levels = {row: [dict[str, str]()] for row in labels}
+        if not table.roles.keys().isdisjoint(CONDITIONS):
+            rows_of = {row: np.flatnonzero([label == row for label in labels]) for row in levels}
+            if is_sweep and not columns:
+                rows_of = {(): np.arange(sum(1 for _ in table.rows()))}
+            levels = {row: split_conditions(table, rows, test_options, table.motion) for row, rows in rows_of.items()}
     except BushfitError:  # which the inspection of the file reports
         return [source], []
-    for texts, tests_at_levels in conditions.items():
+    for texts, tests_at_levels in levels.items():
         keys: dict[str, Any] = dict(zip(columns, texts, strict=True))
         run = {"rows": {table.headers[columns["run"][0]]: keys.pop("run")}} if "run" in keys else {}
         is_direction = keys.get("direction", "axial") in [*Direction]
