@@ -21,6 +21,8 @@ from bushfit.report.results import ResultFile
 from bushfit.units import format_aligned, number
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from bushfit.reading.measurement import Loop
     from bushfit.reading.table import Table
     from bushfit.reduction.resonance import Resonance
@@ -28,8 +30,6 @@ if TYPE_CHECKING:
 
 #: Number of printed lines per octave of a resonance test; chosen: a dozen lines for most tests.
 _LINES_AN_OCTAVE = 3
-#: Quantities whose display units are printed.
-_DISPLAYED = ("displacement", "stiffness")
 
 
 @command_called(
@@ -82,7 +82,7 @@ def command(files: tuple[Path, ...], levels: str | None, cycles: int, output: Ou
         points, warnings = resonance_table(resonance), resonance.warnings
         title = f"{table.file.stem}, {name}: {number(resonance.mass, 4)} kg on a shaker"
         figure = partial(plots.inspection.resonance_figure, resonance, title)
-        _print_resonance(output, resonance)
+        _print_resonance(output, resonance, points)
     else:
         histories = _read(files, test_options)
         body, direction = "direction", histories[0].direction
@@ -94,7 +94,8 @@ def command(files: tuple[Path, ...], levels: str | None, cycles: int, output: Ou
         records = histories[0].name if len(histories) == 1 else f"{len(histories)} histories"
         title = f"{records}: {len(reduction.steps)} points, {direction}"
         figure = partial(plots.inspection.reduction_figure, reduction, histories, title)
-        _print_steps(output, reduction)
+        _print_steps(output, reduction, points)
+    output.warn(warnings)
     if body == "direction":
         points = points.assign(direction=name)  # so that init knows it whatever the file is called
     file = output.formats.table("sweep")
@@ -206,69 +207,63 @@ def _read(files: Sequence[Path], test_options: Mapping[str, Any]) -> list[Loop]:
     return histories
 
 
-def _print_steps(output: Output, reduction: Reduction) -> None:
-    """Print the reduced points, one line per amplitude level and repeat; with -v also the stretches without a point."""
-    import pandas as pd
+def _print_steps(output: Output, reduction: Reduction, points: pd.DataFrame) -> None:
+    """Print the reduced points, one line per amplitude level and repeat; with -v also the stretches without a point.
 
-    from bushfit.reading.measurement import loss_factor
+    Args:
+        output: output of the command.
+        reduction: operating points, with the stretches of the histories without one.
+        points: table of the operating points.
+    """
+    from bushfit.report.tables import response_headers
 
-    (unit, length), (stiffness_unit, factor) = (getattr(reduction.direction.display, key) for key in _DISPLAYED)
-    steps, rows = pd.DataFrame([vars(step) for step in reduction.steps]), []
-    for (level, repeat), line in steps.groupby(["level", "repeat"]):
+    level, stiffness, _ = response_headers(reduction.direction)
+    rows = []
+    for _, line in points.groupby([level, "repeat"]):
         spans = (
-            format_hertz(line["nominal_frequency"]),
-            _span(factor * line["stiffness"].abs(), 4),
-            _span(loss_factor(line["stiffness"].to_numpy()), 3),
+            _format_hertz(line["frequency [Hz]"]),
+            _format_span(line[stiffness], 4),
+            _format_span(line["loss factor [-]"], 3),
         )
-        errors = number(100 * line["gain_error"].max(), 1), number(100 * line["force_distortion"].max(), 2)
-        rows.append((number(length * level, 4), f"{repeat}", f"{len(line)}", *spans, *errors))
-    title = f"{len(steps)} point{'s' * (len(steps) > 1)} found; noise and THD: the largest of each line"
-    heads = ("repeat", "points", "f [Hz]", f"|K| [{stiffness_unit}]", "loss factor", "noise [%]", "THD [%]")
-    output.print_table(title, (f"level [{unit}]", *heads), rows)
-    output.warn(reduction.warnings)
+        noise = (line[stiffness.replace(" [", " std error [")] / line[stiffness]).max()
+        errors = number(100 * noise, 1), number(100 * line["force distortion [-]"].max(), 2)
+        step = number(line[level].iloc[0], 4), f"{line['repeat'].iloc[0]}"
+        rows.append((*step, f"{len(line)}", *spans, *errors))
+    title = f"{len(points)} point{'s' * (len(points) > 1)} found; noise and THD: the largest of each line"
+    heads = ("repeat", "points", "f [Hz]", stiffness.replace("stiffness", "|K|"), "loss factor", "noise [%]", "THD [%]")
+    output.print_table(title, (level.replace("amplitude", "level"), *heads), rows)
     for skip in reduction.skipped if output.verbose else ():
         output.print(f"{skip.name}, {skip.start:.4g} to {skip.end:.4g} s gives no point: {skip.why}")
 
 
-def _print_resonance(output: Output, resonance: Resonance) -> None:
-    """Print a reduced resonance test, one line per third of an octave."""
+def _print_resonance(output: Output, resonance: Resonance, points: pd.DataFrame) -> None:
+    """Print a reduced resonance test, `points` by frequency, one line per third of an octave."""
     import numpy as np
-    import pandas as pd
 
-    from bushfit.geometry import TRANSLATION
-    from bushfit.reading.measurement import loss_factor
+    from bushfit.geometry import Direction
+    from bushfit.report.tables import response_headers
 
-    (unit, length), (stiffness_unit, factor) = (getattr(TRANSLATION.display, key) for key in _DISPLAYED)
-    points = pd.DataFrame(
-        {
-            "frequency": resonance.frequency,
-            "amplitude": length * resonance.amplitude,
-            "ratio": np.abs(resonance.transmissibility),
-            "stiffness": factor * np.abs(resonance.stiffness),
-            "loss": loss_factor(resonance.stiffness),
-            "error": 100 * resonance.relative_error,
-        }
-    )
+    amplitude, stiffness, _ = response_headers(Direction.AXIAL)
     rows = []
-    for _, line in points.groupby((_LINES_AN_OCTAVE * np.log2(points["frequency"])).round()):
-        spans = _span(line["amplitude"], 3), _span(line["ratio"], 3)
-        values = number(line["stiffness"].median(), 4), number(line["loss"].median(), 3), number(line["error"].max(), 2)
-        rows.append((format_hertz(line["frequency"]), f"{len(line)}", *spans, *values))
+    for _, line in points.groupby((_LINES_AN_OCTAVE * np.log2(points["frequency [Hz]"])).round()):
+        spans = _format_span(line[amplitude], 3), _format_span(line["transmissibility [-]"], 3)
+        medians = number(line[stiffness].median(), 4), number(line["loss factor [-]"].median(), 3)
+        error = number(100 * line["relative error [-]"].max(), 2)
+        rows.append((_format_hertz(line["frequency [Hz]"]), f"{len(line)}", *spans, *medians, error))
     frequency, largest = resonance.peak
     count = f"{len(points)} point{'s' * (len(points) > 1)} of {resonance.test.frequency.size} rows"
     title = f"{count}; resonance at {frequency:.1f} Hz, |T| {largest:.2f}"
     title += "\n|K| and loss factor: median of each line; error: the largest"
-    heads = ("f [Hz]", "points", f"amplitude [{unit}]", "|T|", f"|K| [{stiffness_unit}]", "loss factor", "error [%]")
+    heads = ("f [Hz]", "points", amplitude, "|T|", stiffness.replace("stiffness", "|K|"), "loss factor", "error [%]")
     output.print_table(title, heads, rows)
-    output.warn(resonance.warnings)
 
 
-def format_hertz(frequencies: Any) -> str:
+def _format_hertz(frequencies: Any) -> str:
     """Format the lowest and the highest of some frequencies [Hz], such as "5-155"."""
     return "-".join(dict.fromkeys(f"{end:.4g}" for end in (min(frequencies), max(frequencies))))
 
 
-def _span(values: Any, digits: int) -> str:
+def _format_span(values: Any, digits: int) -> str:
     """Format the smallest and the largest of some numbers with common decimals, such as "537.2-693.0"."""
     high, low = format_aligned([float(max(values)), float(min(values))], digits, minimum_digits=2)
     return "-".join(dict.fromkeys((low, high)))

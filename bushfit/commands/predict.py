@@ -129,7 +129,7 @@ def predict(
     places = [place for name in settings.directions or () for place in get_places(name, [*specimens.values()])]
     places = places or default_places(result.model.bushing, [*specimens.values()])
     measured = _predictable_sweeps(result, campaign) if campaign and not over else []
-    drawn_sweeps = [
+    compared_sweeps = [
         sweep
         for sweep in measured
         if not depends_on_temperature
@@ -141,7 +141,7 @@ def predict(
     for place, preload in loads:
         drawn = [
             sweep
-            for sweep in drawn_sweeps
+            for sweep in compared_sweeps
             if sweep.direction == place and (preload is None or preload.equals(sweep.test.preload))
         ]
         prediction = predict_stiffness(
@@ -174,7 +174,7 @@ def predict(
             )
     notes = (*notes, *(f"{sweep.name}: {note}" for sweep in measured for note in sweep.notes))
     output = PredictionOutput(result, predictions, measured, notes, resonances, maxwell, curves)
-    return replace(output, files=prediction_files(output, drawn_sweeps, temperature, wide=wide))
+    return replace(output, files=prediction_files(output, wide=wide))
 
 
 def _assign_bushing(campaign: Campaign, result: Result) -> tuple[Campaign, list[str]]:

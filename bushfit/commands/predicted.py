@@ -111,15 +111,11 @@ class PredictionOutput:
         return expected_errors(self.result.model, *self.measured_by_fit)
 
 
-def prediction_files(
-    output: PredictionOutput, drawn_sweeps: Sequence[MeasuredSweep], temperature: float | None, *, wide: bool
-) -> list[ResultFile]:
+def prediction_files(output: PredictionOutput, *, wide: bool) -> list[ResultFile]:
     """Tables and figures of a prediction.
 
     Args:
         output: the prediction.
-        drawn_sweeps: measured sweeps that the figures show.
-        temperature: temperature of the prediction [K]; None for the reference temperature.
         wide: True to add tables with one column per amplitude.
 
     Returns:
@@ -127,28 +123,27 @@ def prediction_files(
     """
     result, by_place = output.result, by_direction(output.predictions)
     places = [predictions[0].direction for predictions in by_place]
-    names = place_names(places)
+    names, (fitted, others) = place_names(places), output.measured_by_fit
+    tabled = partial(tables.sweeps_table, result.model, [*fitted, *others])
+    use = ["yes"] * sum(sweep.frequency.size for sweep in fitted)
+    use += ["no"] * sum(sweep.frequency.size for sweep in others)
+    measured = ResultFile("measured", "table", lambda: tabled().assign(fitted=use))
 
     def draw(prediction: Prediction) -> Figure:
-        """Draw a prediction with the measured sweeps of its direction.
-
-        Returns:
-            Figure with the warnings below it.
-        """
+        """Draw a prediction with the measured sweeps of its direction, and with the warnings below the figure."""
         place = prediction.direction
-        measured = [sweep for sweep in drawn_sweeps if sweep.direction == place]
-        table = tables.sweeps_table(result.model, measured) if measured else None
         title = result.name if isinstance(place, Direction) else str(place)
         title += f", over {prediction.over.describe(place)}" if prediction.over else ""
         note = plots.style.warnings_note(warnings_of(result, [], (*prediction.warnings, *output.notes)))
-        return plots.prediction.prediction_figure(result, prediction, table, title, note, temperature)
+        table = measured.content() if output.measured else None
+        return plots.prediction.prediction_figure(result, prediction, table, title, note)
 
     files = list[ResultFile]()
     for name, predictions in zip(names, by_place, strict=True):
         files.append(ResultFile(name, "table", partial(joined_table, prediction_table, predictions)))
         files.append(ResultFile(name, "figure", partial(draw, predictions[0])))
         if len(predictions) > 1:
-            over_preload = partial(plots.preload.preload_figure, result, predictions, result.name, temperature)
+            over_preload = partial(plots.preload.preload_figure, result, predictions, result.name)
             files.append(ResultFile(f"{name}_preload", "figure", over_preload))
     if output.arms:
         files.append(ResultFile("arms", "table", partial(tables.arms_table, result.model, output.arms, places)))
@@ -166,13 +161,7 @@ def prediction_files(
             if suffix == "static":
                 title = f"{result.name}: {part[0].label if len(part) == 1 else part[0].direction}, static curve"
                 files.append(ResultFile(stem, "figure", partial(plots.prediction.static_figure, part, title)))
-    if output.measured:
-        fitted, others = output.measured_by_fit
-        make = partial(tables.sweeps_table, result.model, [*fitted, *others])
-        use = ["yes"] * sum(sweep.frequency.size for sweep in fitted)
-        use += ["no"] * sum(sweep.frequency.size for sweep in others)
-        files.append(ResultFile("measured", "table", lambda: make().assign(fitted=use)))
-    return files
+    return [*files, measured] if output.measured else files
 
 
 def by_direction(parts: Sequence[Part]) -> list[list[Part]]:

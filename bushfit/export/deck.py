@@ -83,11 +83,12 @@ def stiffness_tables(prediction: Prediction) -> list[StiffnessTable]:
     """
     direction = prediction.direction.axis
     assert direction
-    stiffness = prediction.storage_stiffness.value + 1j * prediction.loss_stiffness.value
-    rows = [(amplitude, prediction.amplitude == amplitude) for amplitude in np.unique(prediction.amplitude)]
-    return [
-        StiffnessTable(direction, float(value), prediction.frequency[mask], stiffness[mask]) for value, mask in rows
-    ]
+    tables = []
+    for amplitude in np.unique(prediction.amplitude).tolist():
+        mask = prediction.amplitude == amplitude
+        table = prediction.frequency[mask], prediction.complex_stiffness[mask]
+        tables.append(StiffnessTable(direction, amplitude, *table))
+    return tables
 
 
 def amplitude_levels(request: ExportRequest) -> list[AmplitudeLevel]:

@@ -223,8 +223,7 @@ def _steady_omissions(
     plain, values = model.without(*fixed), model.values_at(place, frequency, amplitude)
     written = plain.with_values({name: values[name] for name in plain.values})
     stiffness = written.stiffness(place, prediction.frequency, prediction.amplitude, conditions=conditions)
-    complete = prediction.storage_stiffness.value + 1j * prediction.loss_stiffness.value
-    error = float(np.max(np.abs(stiffness / complete - 1.0)))
+    error = float(np.max(np.abs(stiffness / prediction.complex_stiffness - 1.0)))
     if error < 1e-6 and not omitted:  # rounding
         return []
     unit, factor = place.display.displacement

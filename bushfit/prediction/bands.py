@@ -32,6 +32,11 @@ class Band:
     high: Array
     root: Array = field(default_factory=lambda: np.empty((0, 1)))
 
+    @property
+    def ends(self) -> Array:
+        """Value, low and high end of the band in three rows, (3, n)."""
+        return np.array([self.value, self.low, self.high])
+
     def logarithm(self) -> Band:
         """Band of the natural logarithm of the (positive) quantity."""
         low, high = (np.log(self.value) + end / self.value - 1.0 for end in (self.low, self.high))

@@ -60,6 +60,7 @@ class Prediction:
             point without a measurement; None without sweeps.
         preload: preload of all points; None unless this direction was tested at several preloads.
         over: slow large motion or static offset under the harmonic; None for the harmonic alone.
+        temperature: temperature of the rubber [K]; None for the reference temperature.
     """
 
     direction: Place
@@ -74,6 +75,12 @@ class Prediction:
     measured: Array | None = None
     preload: Preload | None = None
     over: LargeMotion | None = None
+    temperature: float | None = None
+
+    @property
+    def complex_stiffness(self) -> Array:
+        """Predicted complex stiffness K' + i K'', in the unit of |K|, (n,)."""
+        return self.storage_stiffness.value + 1j * self.loss_stiffness.value
 
     @property
     def label(self) -> str:
@@ -144,6 +151,7 @@ def predict(
         measured=None if sweeps is None else measured_stiffness(direction, frequency, amplitude, sweeps),
         preload=conditions.preload,
         over=over,
+        temperature=temperature,
     )
     compared = replace(prediction, measured=None) if rig else prediction
     warnings = point_warnings(result, compared, temperature, preload)

@@ -12,7 +12,6 @@ import pandas as pd
 
 from bushfit.diagnosis.document import DiagnosisFile
 from bushfit.diagnosis.record import format_odds
-from bushfit.effects.temperature import REFERENCE
 from bushfit.errors import ModelError
 from bushfit.geometry import STRAINING, TRANSLATION
 from bushfit.model.document import CampaignTable
@@ -20,7 +19,6 @@ from bushfit.model.file import from_document, require_schema
 from bushfit.model.result import Result
 from bushfit.prediction.caveats import agrees_within_noise, by_importance, consequence_of, warnings_of
 from bushfit.prediction.stiffness import Prediction
-from bushfit.reading.measurement import SAME_TEMPERATURE
 from bushfit.report import plots
 from bushfit.report.page import render_page
 from bushfit.report.page.record import JOINT, MODELS, predict_tables, tested_tables
@@ -29,7 +27,7 @@ from bushfit.report.page.values import headline_texts, value_rows
 from bushfit.report.parameters import correlation_texts, effect_sizes, parameter_rows
 from bushfit.report.results import ResultFile, contents
 from bushfit.report.tables import DISPLAYS, missing_column
-from bushfit.units import CELSIUS, number
+from bushfit.units import number
 from bushfit.validation import validate_tables
 
 if TYPE_CHECKING:
@@ -143,12 +141,12 @@ def draw_figures(
         Figures of the report, and True if further figures are left out.
     """
     sweeps, loops, gap = (tables.get(name) for name in ("sweeps", "loops", "gap"))
-    drawn_sweeps, title = comparable_sweeps(sweeps, result), result.name
+    title = result.name
     # file name, heading, function and its arguments
     figures: list[tuple[str, str, Callable[..., Chart], tuple[Any, ...]]] = []
     for name, prediction in [*predictions.items()][:_MOST_PLACES]:
         heading, draw = f"{prediction.direction}: prediction and measurement", plots.prediction.prediction_figure
-        figures.append((name, heading, draw, (result, prediction, drawn_sweeps, title)))
+        figures.append((name, heading, draw, (result, prediction, sweeps, title)))
     if gap is not None and diagnosis is not None:
         figures.append(("gap", "Measured minus model", plots.gap.gap_figure, (gap, result, diagnosis, title)))
     elif sweeps is not None:
@@ -173,22 +171,6 @@ def draw_figures(
             break
         pictures.append(drawing)
     return pictures, len(pictures) < len(figures) or len(predictions) > _MOST_PLACES
-
-
-def comparable_sweeps(sweeps: pd.DataFrame | None, result: Result) -> pd.DataFrame | None:
-    """Select the measured sweeps to draw with a prediction: if the model depends on temperature, those at 23 °C.
-
-    Args:
-        sweeps: table of sweeps; None without sweeps.
-        result: fitted model.
-
-    Returns:
-        Table of the sweeps to draw; None if there are none.
-    """
-    if sweeps is None or "temperature [degC]" not in sweeps or "temperature" not in result.model.depends_on:
-        return sweeps
-    degrees = sweeps.groupby("sweep" if "sweep" in sweeps else "test")["temperature [degC]"].transform("mean")
-    return sweeps[~((degrees - (REFERENCE - CELSIUS)).abs() > SAME_TEMPERATURE)]
 
 
 def group_warnings(warnings: Iterable[str]) -> dict[str, list[str]]:

@@ -17,12 +17,13 @@ from bushfit.report.plots.measured import (
     SECTOR,
     Curve,
     SweepGroup,
-    average_at_x,
+    draw_sector_means,
     loops_by_direction,
     phase_after_turn,
-    sector_means,
     sweep_groups,
+    table_stiffness,
 )
+from bushfit.report.plots.pairs import ResponsePair, stride
 from bushfit.report.tables import displacement_header, response_headers, shorten
 from bushfit.units import display_unit, format_range
 
@@ -30,10 +31,6 @@ from bushfit.units import display_unit, format_range
 _STRIP = 2.6
 #: Number of points of a line of the model.
 _FINE = 30
-#: Curves of more points than this are drawn with small dots.
-_MANY_POINTS = 60
-#: Number of points of a panel above which curves are thinned, and smallest number of points of a thinned curve.
-_PANEL_POINTS, _CURVE_POINTS = 480, 24
 #: Largest number of rows of a loop that are drawn.
 _MOST_ROWS = 240
 #: Stated relative error above which a point is not drawn, because its scatter would hide other points.
@@ -74,51 +71,28 @@ def sweeps_figure(result: Result, table: pd.DataFrame, title: str) -> style.Char
     )
 
 
-def draw_curves(pair: Sequence[Axes], group: SweepGroup, result: Result) -> None:
+def draw_curves(panels: Sequence[Axes], group: SweepGroup, result: Result) -> None:
     """Draw stiffness magnitude (left) and loss factor (right) of sweeps: measured points and lines of the model.
 
     Args:
-        pair: left and right panel.
+        panels: left and right panel.
         group: sweeps of one direction or specimen, with a curve per fixed amplitude (or frequency).
         result: fitted model, with the effects of the rig.
     """
-    stiffness, x_header = response_headers(group.place)[1], group.x_header
-    to_table = group.place.display.stiffness.factor
-    largest = max(float(curve.rows[stiffness].max()) for curve in group.curves)
-    all_x = np.concatenate([curve.rows[x_header] for curve in group.curves])
-    factor = label_response(pair, group.place, largest / to_table, x_header, all_x) / to_table
+    rows = pd.concat([curve.rows for curve in group.curves])
+    largest = float(np.abs(table_stiffness(rows, group.place)).max())
+    pair = ResponsePair(panels, group.place, largest, group.x_header, rows[group.x_header].to_numpy())
     looks = style.styles(len(group.curves), group.palette)
-    for axes, header, scale in zip(pair, (stiffness, "loss factor [-]"), (factor, 1.0), strict=True):
-        for curve, look in zip(group.curves, looks, strict=True):
-            draw_points(axes, points_to_draw(curve.rows), x_header, header, scale, look, len(group.curves))
-            x, values = _model_line(group, curve, header, result)
-            axes.plot(x, scale * values, color=look.color, ls=look.dashes, lw=1.3)
+    for curve, look in zip(group.curves, looks, strict=True):
+        drawn = points_to_draw(curve.rows)
+        x = drawn[group.x_header].to_numpy()
+        pair.draw_points(x, table_stiffness(drawn, group.place), look, len(group.curves))
+        pair.plot(*_model_line(group, curve, result), color=look.color, ls=look.dashes, lw=1.3)
     names = [shorten(curve.name, 30) for curve in group.curves]
     if group.shares_levels:
-        style.name_levels(pair[-1], names, group.palette)
+        style.name_levels(panels[-1], names, group.palette)
     else:
-        style.legend(pair[-1], [look.handle(True) for look in looks], names, "test")
-
-
-def label_response(pair: Sequence[Axes], place: Place, largest: float, x_label: str, x: Array | None = None) -> float:
-    """Label two panels for the stiffness magnitude (left) and the loss factor (right) of a direction or specimen.
-
-    Args:
-        pair: left and right panel.
-        place: direction or specimen of the tests.
-        largest: largest stiffness or modulus to draw [SI], which determines the unit.
-        x_label: label of the x axes, with unit.
-        x: values along x, which decide between linear and logarithmic axes, (n,); None for linear.
-
-    Returns:
-        Factor from SI to the unit of the left panel.
-    """
-    unit, factor = display_unit(*place.display.stiffness, largest)
-    quantity = response_headers(place)[1].partition(" [")[0]
-    symbol = " |K|" if quantity == "stiffness" else ""
-    style.label_axes(pair[0], x_label, f"{place} {quantity}{symbol} [{unit}]", x)
-    style.label_axes(pair[1], x_label, f"{place} loss factor [-]", x)
-    return factor
+        style.legend(panels[-1], [look.handle(True) for look in looks], names, "test")
 
 
 def points_to_draw(rows: pd.DataFrame) -> pd.DataFrame:
@@ -127,28 +101,6 @@ def points_to_draw(rows: pd.DataFrame) -> pd.DataFrame:
     if "stated error [-]" in rows:
         keep &= ~(rows["stated error [-]"] > _WORST_DRAWN)
     return rows[keep]
-
-
-def draw_points(
-    axes: Axes, rows: pd.DataFrame, x_header: str, header: str, scale: float, look: style.Style, curves: int
-) -> None:
-    """Draw the measured points of one curve: means of repeats, with bars from the smallest to the largest value.
-
-    Args:
-        axes: panel.
-        rows: rows of a table of sweeps at one fixed amplitude or frequency.
-        x_header, header: headers of the columns along x and y.
-        scale: factor from the unit of the y column to that of the panel.
-        look: colour and marker of the points.
-        curves: number of curves in the panel; the more there are, the more points are omitted.
-    """
-    repeats = rows[header].groupby(rows[x_header])
-    step = max(1, -(-repeats.ngroups // max(_CURVE_POINTS, _PANEL_POINTS // curves)))
-    means, low, high = (scale * values[::step] for values in (repeats.mean(), repeats.min(), repeats.max()))
-    if repeats.ngroups < len(rows):
-        axes.vlines(means.index, low, high, color=look.color, lw=0.7, alpha=0.7)
-    points = style.POINT if repeats.ngroups <= _MANY_POINTS else style.DOT | {"alpha": 0.5}
-    axes.plot(means.index, means, look.marker, color=look.color, **points)
 
 
 def points_note(table: pd.DataFrame) -> str:
@@ -161,29 +113,25 @@ def points_note(table: pd.DataFrame) -> str:
     return f"Points: {bars}.{left_out}"
 
 
-def _model_line(group: SweepGroup, curve: Curve, header: str, result: Result) -> tuple[Array, Array]:
-    """Points (x, y) of the model line of a curve: on a fine grid, or at the measured points if conditions vary.
+def _model_line(group: SweepGroup, curve: Curve, result: Result) -> tuple[Array, Array]:
+    """Points of the model line of a curve: on a fine grid, or at the measured points if conditions vary.
 
     Args:
         group: sweeps of one direction or specimen.
         curve: points of the sweeps at one fixed amplitude or frequency.
-        header: header of the column along y.
         result: fitted model, with the effects of the rig.
 
     Returns:
-        x and y in the units of the table, (m,) each.
+        x in the unit of the table, and complex stiffness [SI], (m,) each.
     """
-    if not group.shares_levels or result.model.depends_on:
-        x, values = average_at_x(curve.rows, group.x_header, f"model {header}")
-        return x, values
     x = curve.rows[group.x_header].to_numpy()
+    if not group.shares_levels or result.model.depends_on:
+        modelled = pd.Series(table_stiffness(curve.rows, group.place, "model ")).groupby(x).mean()
+        return modelled.index.to_numpy(), modelled.to_numpy()
     fine = np.geomspace(x.min(), x.max(), _FINE)
     length = group.place.display.displacement.factor
     axes = (fine, curve.level / length) if group.axis == "frequency" else (curve.level, fine / length)
-    stiffness = result.model.stiffness(group.place, *np.broadcast_arrays(*axes))
-    if header == "loss factor [-]":
-        return fine, stiffness.imag / stiffness.real
-    return fine, np.abs(stiffness) * group.place.display.stiffness.factor
+    return fine, result.model.stiffness(group.place, *np.broadcast_arrays(*axes))
 
 
 def _draw_residuals(strips: Sequence[Axes], group: SweepGroup) -> None:
@@ -199,7 +147,7 @@ def _draw_residuals(strips: Sequence[Axes], group: SweepGroup) -> None:
         header = f"{part} residual [noise]"
         for curve, look in zip(group.curves, looks, strict=True):
             points = points_to_draw(curve.rows)
-            points = points[:: max(1, -(-len(points) // max(_CURVE_POINTS, _PANEL_POINTS // len(looks))))]
+            points = points[:: stride(len(points), len(looks))]
             strip.plot(points[group.x_header], points[header], look.marker, color=look.color, alpha=0.8, **style.DOT)
         style.label_axes(strip, group.x_header, f"{part} residual\n/ noise", x)
         if group.axis == "amplitude" and x.max() > 3.0 * x.min():
@@ -234,10 +182,8 @@ def loops_figure(result: Result, table: pd.DataFrame, title: str) -> style.Chart
             rows = _drawn_rows(counted)
             points = phase_after_turn(counted, place)[rows], counted["residual [noise]"].to_numpy()[rows]
             phase_panel.plot(*points, ".", color=look.color, alpha=0.4, **style.DOT)
-            curve = sector_means(counted, place, "residual [noise]")
-            phase_panel.plot(*curve, color=look.color, ls=look.dashes, lw=1.4)
+            draw_sector_means(phase_panel, counted, place, "residual [noise]", look)
         style.noise_band(phase_panel)
-        phase_panel.set(xlim=(0.0, 360.0), xticks=range(0, 361, 90))
         model = {"model": Line2D([], [], color=style.INK, lw=0.8)}
         style.legend(phase_panel, [look.handle(False) for look in looks], loop_labels(place, loops), "loop", model)
     return figure.explain(

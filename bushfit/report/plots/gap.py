@@ -10,7 +10,6 @@ import pandas as pd
 from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
-from matplotlib.collections import PolyCollection
 from matplotlib.colors import BoundaryNorm, ListedColormap
 
 from bushfit.effects.contract import Array
@@ -23,9 +22,8 @@ from bushfit.report.plots.measured import (
     SECTOR,
     Curve,
     SweepGroup,
-    average_at_x,
+    draw_sector_means,
     loops_by_direction,
-    sector_means,
     sweep_groups,
 )
 from bushfit.report.tables import shorten
@@ -179,14 +177,14 @@ def draw_map(axes: Axes, group: SweepGroup, rows: Sequence[Curve], header: str, 
     logarithmic = x_values.size > 2 and np.std(ratios) / np.mean(ratios) < np.std(steps) / np.mean(steps)
     ends = []
     for y, row in enumerate(rows):
-        x, values = average_at_x(row.rows, group.x_header, header)
-        blocks = np.array_split(np.arange(x.size), min(x.size, _MOST_COLUMNS))
-        x, values = (np.array([column[block].mean() for block in blocks]) for column in (x, values))
+        means = row.rows.groupby(group.x_header)[header].mean()
+        blocks = np.array_split(np.arange(means.size), min(means.size, _MOST_COLUMNS))
+        columns = means.index.to_numpy(), means.to_numpy()
+        x, values = (np.array([column[block].mean() for block in blocks]) for column in columns)
         low, high = cell_edges(x, logarithmic=bool(logarithmic))
-        corners = (low, y - 0.5), (high, y - 0.5), (high, y + 0.5), (low, y + 0.5)
-        cells = np.stack([np.stack(np.broadcast_arrays(*corner), axis=1) for corner in corners], axis=1)
+        cells = list(zip(low.tolist(), (high - low).tolist(), strict=True))
         look: dict[str, Any] = {"norm": colors.norm, "cmap": colors.cmap, "lw": 0.0, "antialiaseds": False}
-        axes.add_collection(PolyCollection(list(cells), array=values, **look), autolim=False)
+        axes.broken_barh(cells, (y - 0.5, 1.0), array=values, **look)
         below = values < -_BARRED
         inset = 0.3 * (high - low)[below]
         axes.hlines(np.full(inset.size, y), low[below] + inset, high[below] - inset, color="white", lw=1.1)
@@ -261,10 +259,9 @@ def _draw_loops(panels: Sequence[Axes], place: Place, loops: dict[str, pd.DataFr
     for axes, side in zip(panels, sides, strict=True):
         style.label_axes(axes, "phase after upper turn [deg]", "")
         for loop, look in zip(loops.values(), looks, strict=True):
-            axes.plot(*sector_means(loop, place, f"force {side} [%]"), color=look.color, ls=look.dashes, lw=1.3)
+            draw_sector_means(axes, loop, place, f"force {side} [%]", look)
         axes.axhline(0.0, color=style.GREY, lw=0.6, zorder=1)
         style.widen_span(axes, 1.0)
-        axes.set(xlim=(0.0, 360.0), xticks=range(0, 361, 90))
     limits = [axes.get_ylim() for axes in panels]
     for axes in panels:
         axes.set_ylim(min(low for low, _ in limits), max(high for _, high in limits))

@@ -15,8 +15,8 @@ from bushfit.reading.measurement import Loop, Sweep, loss_factor
 from bushfit.reduction.resonance import LARGEST_ERROR, Resonance
 from bushfit.reduction.result import Reduction
 from bushfit.report.plots import style
-from bushfit.report.plots.fits import label_response
 from bushfit.report.plots.measured import header_of
+from bushfit.report.plots.pairs import ResponsePair
 from bushfit.report.plots.response import extreme_rows
 from bushfit.report.tables import shorten
 from bushfit.units import display_unit, format_range
@@ -93,27 +93,24 @@ def _draw_history(figure: Figure, cell: SubplotSpec, history: Loop, loop: Axes |
     return loop
 
 
-def _draw_sweep(pair: Sequence[Axes], sweep: Sweep) -> Axes:
+def _draw_sweep(panels: Sequence[Axes], sweep: Sweep) -> Axes:
     """Draw stiffness and loss factor over the stepped quantity of a sweep; return the left panel."""
     place, length = sweep.direction, sweep.direction.display.displacement
-    magnitude = np.abs(sweep.stiffness)
     by_amplitude = sweep.stepped == "amplitude"
     fixed_quantity, unit, scale = ("frequency", "Hz", 1.0) if by_amplitude else ("amplitude", *length)
     x = sweep.step * (length.factor if by_amplitude else 1.0)
     x_label = header_of(place, "amplitude" if by_amplitude else "frequency")
-    factor = label_response(pair, place, float(magnitude.max()), x_label, x)
-    table = pd.DataFrame({"x": x, "stiffness": factor * magnitude, "loss": loss_factor(sweep.stiffness)})
+    pair = ResponsePair(panels, place, float(np.abs(sweep.stiffness).max()), x_label, x)
     levels = np.unique(sweep.held_value)
-    for axes, quantity in zip(pair, ("stiffness", "loss"), strict=True):
-        for level, look in zip(levels, style.styles(levels.size, fixed_quantity), strict=True):
-            rows = table[sweep.held_value == level]
-            means = rows.groupby("x")[quantity].mean()
-            axes.plot(means.index, means, color=look.color, ls=look.dashes, lw=0.8)
-            axes.plot(rows["x"], rows[quantity], look.marker, color=look.color, alpha=0.75, **style.POINT)
+    for level, look in zip(levels, style.styles(levels.size, fixed_quantity), strict=True):
+        at_level = sweep.held_value == level
+        means = pd.Series(sweep.stiffness[at_level]).groupby(x[at_level]).mean()
+        pair.plot(means.index.to_numpy(), means.to_numpy(), color=look.color, ls=look.dashes, lw=0.8)
+        pair.plot(x[at_level], sweep.stiffness[at_level], look.marker, color=look.color, alpha=0.75, **style.POINT)
     if sweep.stepped:
         names = [format_range(unit, scale * level) for level in levels]
-        style.name_levels(pair[-1], names, fixed_quantity)
-    return pair[0]
+        style.name_levels(panels[-1], names, fixed_quantity)
+    return panels[0]
 
 
 @style.fixed_settings()
@@ -175,7 +172,7 @@ def _draw_strip(axes: Axes, history: Loop, reduction: Reduction, looks: dict[flo
 
 
 def _draw_points(
-    pair: Sequence[Axes],
+    panels: Sequence[Axes],
     quality: Sequence[Axes],
     reduction: Reduction,
     steps: pd.DataFrame,
@@ -184,7 +181,7 @@ def _draw_points(
     """Draw stiffness and loss factor of a reduction with bars of two standard errors, and below noise and distortion.
 
     Args:
-        pair: panels of stiffness and of loss factor.
+        panels: panels of stiffness and of loss factor.
         quality: panels of standard errors and of harmonic distortion.
         reduction: operating points of the histories.
         steps: table of the operating points.
@@ -192,28 +189,28 @@ def _draw_points(
     """
     unit, length = reduction.direction.display.displacement
     x = steps["frequency"].to_numpy()
-    factor = label_response(pair, reduction.direction, float(steps["stiffness"].abs().max()), "", x)
+    pair = ResponsePair(panels, reduction.direction, float(steps["stiffness"].abs().max()), "", x)
     for level, look in looks.items():
         rows = steps[steps["level"] == level]
-        frequency, magnitude = rows["frequency"], (factor * rows["stiffness"].abs()).to_numpy()
-        factors = loss_factor(rows["stiffness"].to_numpy())
-        errors = magnitude * rows["gain_error"], (1.0 + factors**2) * rows["phase_error"]
-        for axes, value, error in zip(pair, (magnitude, factors), errors, strict=True):
-            axes.plot(frequency, value, color=look.color, ls=look.dashes, lw=0.7, alpha=0.6)
+        frequency, stiffness = rows["frequency"].to_numpy(), rows["stiffness"].to_numpy()
+        magnitude, loss = pair.values(stiffness)
+        errors = magnitude * rows["gain_error"], (1.0 + loss**2) * rows["phase_error"]
+        pair.plot(frequency, stiffness, color=look.color, ls=look.dashes, lw=0.7, alpha=0.6)
+        for axes, value, error in zip(panels, (magnitude, loss), errors, strict=True):
             axes.vlines(frequency, value - 2 * error, value + 2 * error, color=look.color, lw=0.9)
-            axes.plot(frequency, value, look.marker, color=look.color, **style.POINT)
+        pair.plot(frequency, stiffness, look.marker, color=look.color, **style.POINT)
         noise = 100.0 * np.hypot(rows["gain_error"], rows["phase_error"]) / 2**0.5
         force, motion = 100.0 * rows["force_distortion"], 100.0 * rows["displacement_distortion"]
         quality[0].plot(frequency, noise, look.marker, color=look.color, **style.POINT)
         quality[1].plot(frequency, force, look.marker, color=look.color, **style.POINT)
         quality[1].plot(frequency, motion, look.marker, color=look.color, ms=3.4, mfc="none", mew=0.7)
-    for axes in pair:
+    for axes in panels:
         axes.tick_params(labelbottom=False)
     for axes, label in zip(quality, ("noise [%]", "distortion [%]"), strict=True):
         style.label_axes(axes, "frequency [Hz]", label, x)
         axes.set_ylim(bottom=0.0)
     handles = [look.handle(True) for look in looks.values()]
-    style.legend(pair[-1], handles, [format_range(unit, length * level) for level in looks], "amplitude")
+    style.legend(panels[-1], handles, [format_range(unit, length * level) for level in looks], "amplitude")
 
 
 @style.fixed_settings()

@@ -7,16 +7,19 @@ from typing import Literal, NamedTuple, cast
 
 import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
 
 from bushfit.effects.contract import Array
+from bushfit.effects.temperature import REFERENCE
 from bushfit.geometry import Place
 from bushfit.model.result import Result
 from bushfit.prediction.stiffness import Prediction
 from bushfit.reading.measurement import SAME_TEMPERATURE
 from bushfit.reading.preload import SAME_PRELOAD
 from bushfit.reduction.harmonics import cycle_harmonics
+from bushfit.report.plots.style import Style
 from bushfit.report.tables import displacement_header, response_headers, spread_indices
-from bushfit.units import format_range, number
+from bushfit.units import CELSIUS, format_range, number
 
 #: Quantity along the x axis of a sweep.
 Axis = Literal["frequency", "amplitude"]
@@ -115,27 +118,39 @@ def sweep_groups(table: pd.DataFrame, result: Result) -> list[SweepGroup]:
     return sorted(groups, key=lambda group: order.index(str(group.place)))
 
 
-def rows_at_preload(table: pd.DataFrame, prediction: Prediction) -> pd.DataFrame:
-    """Rows of measured sweeps at the preload of a prediction; all rows if the prediction or the table has none."""
-    value, unit = prediction.preload.in_display_unit(prediction.direction) if prediction.preload else (0.0, "")
-    if (header := f"preload [{unit}]") not in table.columns:
-        return table
-    return table[~((table[header] - value).abs() > SAME_PRELOAD * max(abs(value), table[header].abs().max()))]
-
-
-def average_at_x(rows: pd.DataFrame, x_header: str, *headers: str) -> tuple[Array, ...]:
-    """Average columns of a table over all rows with the same x value.
+def table_stiffness(rows: pd.DataFrame, place: Place, before: str = "") -> Array:
+    """Complex stiffness [SI] in the rows of a table of sweeps, (n,).
 
     Args:
-        rows: rows of a table.
-        x_header: header of the column of x values.
-        headers: headers of the columns to average.
+        rows: rows of one direction or specimen.
+        place: the direction or specimen.
+        before: prefix of the headers, "model " for the modelled stiffness.
+    """
+    loss = rows[f"{before}loss factor [-]"].to_numpy()
+    magnitude = rows[before + response_headers(place)[1]].to_numpy() / place.display.stiffness.factor
+    return np.asarray(magnitude * np.exp(1j * np.arctan(loss)))
+
+
+def rows_at_conditions(table: pd.DataFrame, prediction: Prediction, result: Result) -> pd.DataFrame:
+    """Select the measured sweeps to draw with a prediction: of the same direction, preload and temperature.
+
+    Args:
+        table: table of sweeps, in which preload and temperature may be missing.
+        prediction: prediction of one direction or specimen.
+        result: predicted model; the temperature is ignored if the model does not depend on it.
 
     Returns:
-        Distinct x values, ascending, (k,), and the means of each column, (k,) each.
+        Rows of the table.
     """
-    averages = rows.groupby(x_header)[list(headers)].mean()
-    return averages.index.to_numpy(dtype=float), *averages.to_numpy(dtype=float).T
+    rows = table[table["direction"] == str(prediction.direction)].rename(columns={"sweep": "test"})
+    value, unit = prediction.preload.in_display_unit(prediction.direction) if prediction.preload else (0.0, "")
+    if (header := f"preload [{unit}]") in rows:
+        rows = rows[~((rows[header] - value).abs() > SAME_PRELOAD * max(abs(value), rows[header].abs().max()))]
+    if "temperature [degC]" in rows and "temperature" in result.model.depends_on:
+        degrees = rows.groupby("test")["temperature [degC]"].transform("mean")
+        wanted = (prediction.temperature or REFERENCE) - CELSIUS
+        rows = rows[~((degrees - wanted).abs() > SAME_TEMPERATURE)]
+    return rows
 
 
 def loops_by_direction(table: pd.DataFrame, result: Result) -> Iterator[tuple[Place, dict[str, pd.DataFrame]]]:
@@ -153,22 +168,20 @@ def loops_by_direction(table: pd.DataFrame, result: Result) -> Iterator[tuple[Pl
         yield result.place(str(name)), dict(loops[index] for index in spread_indices(len(loops), MOST_LOOPS))
 
 
-def sector_means(loop: pd.DataFrame, place: Place, header: str) -> tuple[Array, Array]:
-    """Average a column of a loop over sectors of 10 degrees of the cycle.
+def draw_sector_means(axes: Axes, loop: pd.DataFrame, place: Place, header: str, look: Style) -> None:
+    """Draw the means of a column of a loop over sectors of 10 degrees of the cycle, from 0 to 360 degrees.
 
     Args:
+        axes: panel.
         loop: rows of one loop.
         place: direction or specimen of the loop.
         header: header of the column to average.
-
-    Returns:
-        Phase of the middle of each sector that contains rows, after the upper turn of the motion [deg], and the mean of
-        the column in each sector, (k,) each.
+        look: colour and line style.
     """
-    sectors, index = np.unique(
-        np.floor(phase_after_turn(loop, place) / SECTOR) % round(360.0 / SECTOR), return_inverse=True
-    )
-    return (sectors + 0.5) * SECTOR, np.bincount(index, loop[header]) / np.bincount(index)
+    sectors = np.floor(phase_after_turn(loop, place) / SECTOR) % round(360.0 / SECTOR)
+    means = loop[header].groupby(sectors).mean()
+    axes.plot((means.index + 0.5) * SECTOR, means, color=look.color, ls=look.dashes, lw=1.4)
+    axes.set(xlim=(0.0, 360.0), xticks=range(0, 361, 90))
 
 
 def phase_after_turn(loop: pd.DataFrame, place: Place) -> Array:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from functools import partial
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -15,9 +16,10 @@ from bushfit.prediction.static_curve import StaticCurve
 from bushfit.prediction.stiffness import Prediction, predict
 from bushfit.reading.runs import nominal
 from bushfit.report.plots import style
-from bushfit.report.plots.fits import draw_curves, draw_points, label_response, points_note, points_to_draw
-from bushfit.report.plots.measured import Axis, header_of, rows_at_preload, sweep_groups
-from bushfit.report.tables import IF_RIGS, displacement_header, quantity_words, response_headers, spread_indices
+from bushfit.report.plots.fits import draw_curves, points_note, points_to_draw
+from bushfit.report.plots.measured import Axis, header_of, rows_at_conditions, sweep_groups, table_stiffness
+from bushfit.report.plots.pairs import ResponsePair
+from bushfit.report.tables import IF_RIGS, displacement_header, quantity_words, spread_indices
 from bushfit.units import display_unit, format_range
 
 #: Number of points of a line of the model.
@@ -38,7 +40,6 @@ def prediction_figure(
     table: pd.DataFrame | None,
     title: str,
     note: str = "",
-    temperature: float | None = None,
 ) -> style.Chart:
     """Figure of predicted stiffness magnitude and loss factor over frequency and over amplitude, with measured points.
 
@@ -49,10 +50,10 @@ def prediction_figure(
     Args:
         result: fitted or given model.
         prediction: prediction for one direction or specimen.
-        table: measured sweeps from `tables.sweeps_table` to draw as points; None for no points.
+        table: measured sweeps from `tables.sweeps_table`; those at the conditions of the prediction are drawn as
+            points. None for no points.
         title: title of the figure.
         note: further sentences below the figure.
-        temperature: temperature of the prediction [K]; None for the reference temperature.
 
     Returns:
         Figure with one or two rows of panels, and one more for each group of such sweeps.
@@ -64,9 +65,10 @@ def prediction_figure(
             values if values.size < 2 else np.union1d(values, np.geomspace(values[0], values[-1], _FINE))
             for values in (frequencies, amplitudes)
         ]
-        refined = partial(predict, result, place, *fine_axes, temperature=temperature, preload=prediction.preload)
+        conditions: Any = {"temperature": prediction.temperature, "preload": prediction.preload}
+        refined = partial(predict, result, place, *fine_axes, **conditions)
         fine, rig = refined(), refined(rig=True) if rig_effects(result) else None
-    of_place = None if table is None else rows_at_preload(table[table["direction"] == str(place)], prediction)
+    of_place = None if table is None else rows_at_conditions(table, prediction, result)
     groups = [] if of_place is None or of_place.empty else sweep_groups(of_place, result)
     free = [group.thinned() for group in groups if group.palette == "loop" and np.isnan(group.curves[0].level)]
     rows = [curve.rows for group in groups for curve in group.curves if not np.isnan(curve.level)]
@@ -119,7 +121,7 @@ def static_figure(curves: Sequence[StaticCurve], title: str) -> style.Chart:
         for line in (one.loading, one.unloading):
             panels[0].plot(x, factor * line.value, color=look.color, lw=_THIN)
         for axes, band, scale in zip(panels, (one.mean, one.slope), (factor, slope_factor), strict=True):
-            style.draw_band(axes, x, [scale * end for end in (band.value, band.low, band.high)], look, lw=_LINE)
+            style.draw_band(axes, x, scale * band.ends, look, lw=_LINE)
     if len(curves) > 1:
         handles = [look.handle(False) for look in style.styles(len(curves), "loop")]
         style.legend(panels[1], handles, [one.preload.text(place) for one in curves if one.preload], "preload")
@@ -132,7 +134,7 @@ def static_figure(curves: Sequence[StaticCurve], title: str) -> style.Chart:
 
 
 def draw_prediction(
-    pair: Sequence[Axes],
+    panels: Sequence[Axes],
     prediction: Prediction,
     rig: Prediction | None,
     table: pd.DataFrame | None,
@@ -142,7 +144,7 @@ def draw_prediction(
     """Draw predicted stiffness magnitude (left) and loss factor (right), with 95 % bands and measured points.
 
     Args:
-        pair: left and right panel.
+        panels: left and right panel.
         prediction: prediction on a fine grid.
         rig: the same prediction with the effects of the rig; None if the model has no such effects.
         table: measured sweeps of the same direction or specimen; None for no points.
@@ -161,27 +163,22 @@ def draw_prediction(
     chosen = np.flatnonzero(measured) if measured.sum() > 1 else np.arange(levels.size)
     chosen = chosen[spread_indices(chosen.size, _MOST_LEVELS[axis])]
     x, looks = scales[axis] * getattr(prediction, axis), style.styles(chosen.size, fixed)
-    factor = label_response(pair, place, float(prediction.stiffness.value.max()), x_header, x)
-    kinds = (
-        ("stiffness", response_headers(place)[1], factor / place.display.stiffness.factor, factor),
-        ("loss_factor", "loss factor [-]", 1.0, 1.0),
-    )
-    for axes, (name, header, from_table, from_si) in zip(pair, kinds, strict=True):
-        band = getattr(prediction, name)
-        for look, index in zip(looks, chosen, strict=True):
-            mask, rows = getattr(prediction, fixed) == levels[index], points_to_draw(points[index])
-            ends = [from_si * end[mask] for end in (band.value, band.low, band.high)]
-            marker = "_" if mask.sum() == 1 else ""  # a single point is a stroke
-            style.draw_band(axes, x[mask], ends, look, lw=_LINE, marker=marker, ms=14.0)
-            if prediction.if_rigs is not None:
-                value = from_si * getattr(prediction.if_rigs, name).value[mask]
-                axes.plot(x[mask], value, color=look.color, lw=_DOUBLE)
-                axes.plot(x[mask], value, color="white", lw=_CORE)
-            if len(rows) and rig is not None:
-                axes.plot(x[mask], from_si * getattr(rig, name).value[mask], color=look.color, lw=_THIN)
-            if len(rows):
-                draw_points(axes, rows, x_header, header, from_table, look, chosen.size)
-        style.widen_span(axes, 0.04 * from_si * band.high.max() if name == "stiffness" else 0.01)  # flat stays flat
+    pair = ResponsePair(panels, place, float(prediction.stiffness.value.max()), x_header, x)
+    for look, index in zip(looks, chosen, strict=True):
+        mask, rows = getattr(prediction, fixed) == levels[index], points_to_draw(points[index])
+        bands = [band.ends[:, mask] for band in (prediction.stiffness, prediction.loss_factor)]
+        marker = "_" if mask.sum() == 1 else ""  # a single point is a stroke
+        pair.draw_bands(x[mask], bands, look, lw=_LINE, marker=marker, ms=14.0)
+        if prediction.if_rigs is not None:
+            pair.plot(x[mask], prediction.if_rigs.complex_stiffness[mask], color=look.color, lw=_DOUBLE)
+            pair.plot(x[mask], prediction.if_rigs.complex_stiffness[mask], color="white", lw=_CORE)
+        if len(rows) and rig is not None:
+            pair.plot(x[mask], rig.complex_stiffness[mask], color=look.color, lw=_THIN)
+        if len(rows):
+            pair.draw_points(rows[x_header].to_numpy(), table_stiffness(rows, place), look, chosen.size)
+    spans = 0.04 * pair.factor * prediction.stiffness.high.max(), 0.01  # flat stays flat
+    for axes, span in zip(panels, spans, strict=True):
+        style.widen_span(axes, span)
     extra_lines: dict[str, Line2D | tuple[Line2D, ...]] = {}
     if (with_rig := bool(measured[chosen].any() and rig)) or prediction.if_rigs:
         extra_lines["bushing"] = Line2D([], [], color=style.INK, lw=_LINE)
@@ -192,7 +189,7 @@ def draw_prediction(
         extra_lines[IF_RIGS] = tuple(Line2D([], [], color=color, lw=width) for color, width in double)
     unit, to_people = display_unit(*(("Hz", 1.0) if fixed == "frequency" else place.display.displacement), levels.min())
     names = [format_range(unit, to_people * level) for level in levels[chosen]]
-    style.name_levels(pair[-1], names, fixed, measured[chosen].tolist(), extra_lines)
+    style.name_levels(panels[-1], names, fixed, measured[chosen].tolist(), extra_lines)
     return bool(measured[chosen].any())
 
 

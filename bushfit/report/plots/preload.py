@@ -8,7 +8,7 @@ from bushfit.model.result import Result
 from bushfit.prediction.stiffness import Prediction, predict
 from bushfit.reading.preload import Preload
 from bushfit.report.plots import style
-from bushfit.report.plots.fits import label_response
+from bushfit.report.plots.pairs import ResponsePair
 from bushfit.report.tables import spread_indices
 from bushfit.units import format_range
 
@@ -19,16 +19,13 @@ _MOST_LEVELS = 6
 
 
 @style.fixed_settings()
-def preload_figure(
-    result: Result, predictions: Sequence[Prediction], title: str, temperature: float | None = None
-) -> style.Chart:
+def preload_figure(result: Result, predictions: Sequence[Prediction], title: str) -> style.Chart:
     """Figure of stiffness magnitude and loss factor over the preload, at the middle frequency of a prediction.
 
     Args:
         result: fitted model.
         predictions: predictions of one direction or specimen at several preloads, on the same grid.
         title: title of the figure.
-        temperature: temperature of the prediction [K]; None for the reference temperature.
 
     Returns:
         Figure with a line and a 95 % band for at most six amplitudes, and points at measured preloads.
@@ -39,24 +36,25 @@ def preload_figure(
     amplitudes = amplitudes[spread_indices(amplitudes.size, _MOST_LEVELS)]
     ends = min(preloads).value, max(preloads).value
     loads = [Preload(value, preloads[0].unit) for value in np.linspace(*ends, _FINE).tolist()]
+    temperature = predictions[0].temperature
     fine = [predict(result, place, [frequency], amplitudes, temperature=temperature, preload=load) for load in loads]
     figure = style.Chart(title, style.ROW)
-    pair, unit = figure.subplots(1, 2), preloads[0].in_display_unit(place)[1]
-    factor = label_response(pair, place, max(float(one.stiffness.value.max()) for one in fine), f"preload [{unit}]")
-    over_load = np.array([preload.in_display_unit(place)[0] for preload in loads])
-    for axes, name, scale in zip(pair, ("stiffness", "loss_factor"), (factor, 1.0), strict=True):
-        bands = [getattr(prediction, name) for prediction in fine]
-        curves = scale * np.array([[band.value, band.low, band.high] for band in bands])
-        for index, look in enumerate(style.styles(amplitudes.size, "amplitude")):
-            style.draw_band(axes, over_load, [*curves[:, :, index].T], look)
-            for prediction, preload in zip(predictions, preloads, strict=True):
-                if prediction.measured is not None:  # nan, which is not drawn, without a measurement
-                    mask = (prediction.frequency == frequency) & (prediction.amplitude == amplitudes[index])
-                    stiffness = prediction.measured[mask]
-                    point = np.abs(stiffness) if name == "stiffness" else stiffness.imag / stiffness.real
-                    axes.plot(preload.in_display_unit(place)[0], scale * point, color=look.color, marker=look.marker)
+    panels, unit = figure.subplots(1, 2), preloads[0].in_display_unit(place)[1]
+    largest = max(float(prediction.stiffness.value.max()) for prediction in fine)
+    pair = ResponsePair(panels, place, largest, f"preload [{unit}]")
+    over_load = np.array([load.in_display_unit(place)[0] for load in loads])
+    stiffness, loss = (
+        np.array([getattr(prediction, name).ends for prediction in fine]) for name in ("stiffness", "loss_factor")
+    )
+    for index, look in enumerate(style.styles(amplitudes.size, "amplitude")):
+        pair.draw_bands(over_load, [stiffness[:, :, index].T, loss[:, :, index].T], look)
+        for prediction, preload in zip(predictions, preloads, strict=True):
+            if prediction.measured is not None:  # nan, which is not drawn, without a measurement
+                mask = (prediction.frequency == frequency) & (prediction.amplitude == amplitudes[index])
+                x = np.array([preload.in_display_unit(place)[0]])
+                pair.plot(x, prediction.measured[mask], color=look.color, marker=look.marker)
     unit, to_people = place.display.displacement
-    style.name_levels(pair[-1], [format_range(unit, to_people * level) for level in amplitudes], "amplitude")
+    style.name_levels(panels[-1], [format_range(unit, to_people * level) for level in amplitudes], "amplitude")
     sentence = f"Lines: model at {format_range('Hz', frequency)}; shaded: its 95 % band."
     measured = any(prediction.measured is not None for prediction in predictions)
     return figure.explain(sentence, *["Points: measured."] * measured)

@@ -254,13 +254,13 @@ def noise_band(axes: Axes) -> None:
     widen_span(axes, 7.0)
 
 
-def draw_band(axes: Axes, x: Array, band: Sequence[Array], look: Style, **options: Any) -> None:
+def draw_band(axes: Axes, x: Array, band: Array, look: Style, **options: Any) -> None:
     """Draw a predicted quantity as a line in its shaded 95 % band.
 
     Args:
         axes: panel.
         x: values along x in the unit of the panel, (n,).
-        band: value, low and high end in the unit of the panel, (n,) each.
+        band: value, low and high end in the unit of the panel, (3, n).
         look: colour and line style.
         **options: further properties of the line.
     """
