@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from bushfit.effects.contract import Array
-from bushfit.errors import ModelError, printable
+from bushfit.errors import printable
 from bushfit.fitting.master_curve import ShiftedSweep
 from bushfit.fitting.preparation import MeasuredLoop, MeasuredSweep
 from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Display, Place
@@ -368,21 +368,3 @@ def shorten(name: str, letters: int) -> str:
 def spread_indices(count: int, maximum: int) -> Array:
     """Indices of at most `maximum` of `count` elements, evenly from the first to the last, (min(count, maximum),)."""
     return np.linspace(0, count - 1, min(maximum, count)).round().astype(int)
-
-
-def require_columns(rows: pd.DataFrame, *headers: str) -> pd.DataFrame:
-    """Check that a table has columns with the given headers, and return the table.
-
-    Raises:
-        ModelError: a column is missing.
-    """
-    for header in headers:
-        if header not in rows:
-            raise missing_column(header)
-    return rows
-
-
-def missing_column(header: str) -> ModelError:
-    """Error for a table without the column `header`."""
-    hint = "write the results again, or remove the file: the page then omits the table"
-    return ModelError("a column of a table is missing", expected=header, hint=hint)

@@ -82,8 +82,7 @@ def folder_pages(folder: Path, base: str = "", date: str | None = None) -> list[
     from bushfit.report.compared import read_comparison
     from bushfit.report.page.comparison import comparison_page
     from bushfit.report.page.index import index_page
-    from bushfit.report.page.record import MODELS, read_results
-    from bushfit.report.page.report import report_page
+    from bushfit.report.page.record import MODELS
 
     if (file := folder / "batch.json").exists():
         document = read_document(file)
@@ -95,5 +94,28 @@ def folder_pages(folder: Path, base: str = "", date: str | None = None) -> list[
         comparison = read_comparison(read_document(file), file)
         pages.append(ResultFile("compare", "page", partial(comparison_page, comparison)))
     if not pages or any((folder / f"{name}.json").exists() for name in MODELS):
-        pages.append(ResultFile("report", "page", partial(report_page, read_results(folder), date, folder)))
+        pages.append(ResultFile("report", "page", partial(saved_page, folder, date)))
     return pages
+
+
+def saved_page(folder: Path, date: str | None) -> str:
+    """Make the report of a results folder as an HTML page.
+
+    Args:
+        folder: results folder.
+        date: date of the report; None for the date that the campaign states.
+
+    Returns:
+        The page as HTML.
+
+    Raises:
+        ModelError: a folder without results, or a file in it that is not as bushfit writes it.
+    """
+    from bushfit.report.page.record import read_results
+    from bushfit.report.page.report import report_page
+
+    try:
+        return report_page(read_results(folder), date, folder)
+    except KeyError as error:
+        hint = "write the results again, or remove the file: the page then omits the table"
+        raise ModelError("a column of a table is missing", expected=str(error.args[0]), hint=hint) from error

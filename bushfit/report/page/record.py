@@ -19,7 +19,7 @@ from bushfit.prediction.stiffness import Prediction, predict
 from bushfit.reading.files import read_utf8
 from bushfit.reading.tablefile import unescape_formula
 from bushfit.report.results import ResultFile, place_names
-from bushfit.report.tables import require_columns, response_headers, spread_indices
+from bushfit.report.tables import response_headers, spread_indices
 
 #: Documents with a model in order of preference; document of the fit without the effects that a diagnosis added.
 MODELS, JOINT = ("model", "dynamic", "static"), "joint"
@@ -45,15 +45,12 @@ def tested_tables(tables: Mapping[str, pd.DataFrame]) -> dict[str, pd.DataFrame]
     """
     tested = {name: tables[name] for name in ("gap", "sweeps", "loops") if name in tables}
     if "gap" in tested:
-        gap = require_columns(tested["gap"], "test", "kind", "direction")
+        gap = tested["gap"]
         parts = {"force": "residual", "storage": "stiffness residual", "loss": "loss residual"}
         rows = gap.rename(columns={f"{part} after [noise]": f"{name} [noise]" for part, name in parts.items()})
         for name, kind in (("sweeps", "sweep"), ("loops", "loop")):
             if name not in tested and (gap["kind"] == kind).any():
                 tested[name] = rows[gap["kind"] == kind]
-    for name, header in (("sweeps", "stepped"), ("loops", "frequency [Hz]")):
-        if name in tested:
-            require_columns(tested[name], "direction", header, "frequency [Hz]", "outlier")
     return tested | {name: table for name, table in tables.items() if name.startswith("validation_")}
 
 
@@ -78,8 +75,7 @@ def predict_tables(
             table = sweeps[sweeps["direction"] == str(place)]
         if table is None or table.empty:
             continue
-        headers = ["frequency [Hz]", response_headers(place)[0]]
-        axes = [np.unique(column) for column in require_columns(table, *headers)[headers].to_numpy(dtype=float).T]
+        axes = [np.unique(table[header]) for header in ("frequency [Hz]", response_headers(place)[0])]
         if name not in tables:
             axes = [levels[spread_indices(levels.size, _MOST_LEVELS)] for levels in axes]
         predictions[name] = predict(result, place, axes[0], axes[1] / place.display.displacement.factor)

@@ -26,7 +26,7 @@ from bushfit.report.page.svg import Picture, picture
 from bushfit.report.page.values import headline_texts, value_rows
 from bushfit.report.parameters import correlation_texts, effect_sizes, parameter_rows
 from bushfit.report.results import ResultFile, contents
-from bushfit.report.tables import DISPLAYS, missing_column
+from bushfit.report.tables import DISPLAYS
 from bushfit.units import number
 from bushfit.validation import validate_tables
 
@@ -159,12 +159,7 @@ def draw_figures(
             figures.append((name, heading, plots.response.response_figure, (title, table)))
     pictures, room = list[Picture](), _LARGEST_FIGURES
     for name, heading, draw, arguments in figures:
-        try:
-            chart = charts[name].content() if name in charts else draw(*arguments)
-        except KeyError as error:
-            if not isinstance(error.__cause__, KeyError):  # pandas chains the error of a missing header
-                raise
-            raise missing_column(str(error.args[0])) from error
+        chart = charts[name].content() if name in charts else draw(*arguments)
         drawing = picture(chart, f"f{len(pictures)}-", heading)
         room -= len(drawing.svg)
         if room <= 0:

@@ -5,7 +5,6 @@ import pandas as pd
 
 from bushfit.effects.contract import Array
 from bushfit.report.plots import style
-from bushfit.report.tables import missing_column
 
 #: Largest number of rows of a curve over time, and of a curve over displacement; a figure has fewer pixels.
 _MOST_OVER_TIME, _MOST_OVER_DISPLACEMENT = 3000, 20_000
@@ -28,7 +27,7 @@ def response_figure(title: str, table: pd.DataFrame, note: str = "") -> style.Ch
         Figure with three panels per direction.
 
     Raises:
-        KeyError, ModelError: a column of the table is missing.
+        KeyError: a column of the table is missing.
     """
     headers = [str(header) for header in table]
     measured = [table[header].to_numpy(dtype=float) for header in headers if header.startswith("measured ")]
@@ -40,7 +39,7 @@ def response_figure(title: str, table: pd.DataFrame, note: str = "") -> style.Ch
         force, low, high = (table[resists + end].to_numpy(dtype=float) for end in ("", ", low", ", high"))
         moves = headers[headers.index(resists) - 1]
         if moves == "time [s]" or moves.endswith(", high"):
-            raise missing_column(f"displacement before {resists}")
+            raise KeyError(f"displacement before {resists}")
         displacement = table[moves].to_numpy(dtype=float)
         motion = figure.add_subplot(grid[2 * row, :2])
         course = figure.add_subplot(grid[2 * row + 1, :2], sharex=motion)
