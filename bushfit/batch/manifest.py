@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import glob
-import io
 import os
 import re
 from collections import Counter
@@ -207,23 +206,21 @@ def read_csv_entries(path: Path) -> list[Entry]:
     """
     text = read_utf8(path, CampaignError).decode("utf-8-sig")
     delimiter = max(",;\t", key=text.lstrip().partition("\n")[0].count)
-    reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter, strict=True)
-    lines, entries = list[list[str]](), list[Entry]()
-    try:
-        for cells in reader:
-            if reader.line_num > len(lines) + 1:
-                raise csv.Error("a quoted cell continues in the next line")
-            lines.append([cell.strip() for cell in cells])
-    except csv.Error as error:
-        raise CampaignError(
-            "a quote is not closed",
-            file=path,
-            place=f"line {len(lines) + 1}",
-            found=str(error),
-            expected="one line for each bushing, and quotes in pairs",
-            hint="a quote that belongs to a name is written twice, in a cell in quotes",
-        ) from None
-    filled = [(number, cells) for number, cells in enumerate(lines, start=1) if any(cells)]
+    filled, entries = list[tuple[int, list[str]]](), list[Entry]()
+    for number, line in enumerate(text.splitlines(), start=1):
+        try:
+            cells = [cell.strip() for row in csv.reader([line], delimiter=delimiter, strict=True) for cell in row]
+        except csv.Error as error:
+            raise CampaignError(
+                "a quote is not closed",
+                file=path,
+                place=f"line {number}",
+                found=str(error),
+                expected="one line for each bushing, and quotes in pairs",
+                hint="a quote that belongs to a name is written twice, in a cell in quotes",
+            ) from None
+        if any(cells):
+            filled.append((number, cells))
     header, keys = filled[0][1] if filled else [], [key.name for key in fields(Entry)]
     if unknown := [column for column in header if column not in keys]:
         with error_location(path, "header"):

@@ -1,8 +1,8 @@
 """Folder of a row: its result files and `row.json`, whose hashes show whether the files are still valid.
 
 Notes:
-    A folder is written under a temporary name and renamed, so a killed process leaves a complete folder or none. If a
-    crash of the machine damages a file, its hash no longer matches, and the row is evaluated again.
+    `row.json` is removed first and written last. If a process is killed, or a crash of the machine damages a file,
+    `row.json` is missing or a hash does not match, and the row is evaluated again.
 """
 
 import contextlib
@@ -10,7 +10,6 @@ import hashlib
 import json
 import os
 import shutil
-import uuid
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import asdict
 from pathlib import Path
@@ -28,8 +27,6 @@ from bushfit.version import __version__
 ROW_FILE = "row.json"
 #: Name of the folder in the batch folder that contains the folders of the rows.
 ROWS_FOLDER = "bushings"
-#: Name of the folder in the batch folder in which files are prepared; removed when the batch ends.
-STAGE = ".aside"
 
 
 def row_key(row: Row, points: Collection[Point], formats: Formats) -> str:
@@ -81,22 +78,13 @@ def save_row(output: Path, row: Row, files: Mapping[str, bytes], record: RowFile
     Raises:
         OSError: the disk is full or cannot be written.
     """
-    folder, staged, earlier = output / ROWS_FOLDER / row.folder, *(output / STAGE / uuid.uuid4().hex for _ in "12")
-    staged.mkdir()
-    try:
-        document = json.dumps(to_json_data(record, RowFile), separators=(",", ":")).encode() + b"\n"
-        for name, content in {**files, ROW_FILE: document}.items():
-            (staged / name).write_bytes(content)
-        with contextlib.suppress(FileNotFoundError):
-            folder.rename(earlier)
-        try:
-            staged.rename(folder)
-        except OSError:
-            if not folder.exists():  # else a worker that was given up for lost has just written the same row
-                raise
-    finally:
-        for path in (staged, earlier):
-            shutil.rmtree(path, ignore_errors=True)
+    folder = output / ROWS_FOLDER / row.folder
+    document = json.dumps(to_json_data(record, RowFile), separators=(",", ":")).encode() + b"\n"
+    (folder / ROW_FILE).unlink(missing_ok=True)
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(exist_ok=True)
+    for name, content in {**files, ROW_FILE: document}.items():
+        (folder / name).write_bytes(content)
 
 
 def digest(data: bytes) -> str:
@@ -106,7 +94,7 @@ def digest(data: bytes) -> str:
 
 @contextlib.contextmanager
 def batch_folder(output: Path) -> Iterator[None]:
-    """Reserve the results folder for one batch, and remove unfinished files of a killed batch.
+    """Reserve the results folder for one batch.
 
     Returns:
         Context in which the folder is locked, if the file system has locks.
@@ -114,21 +102,21 @@ def batch_folder(output: Path) -> Iterator[None]:
     Raises:
         OutputError: another batch is running in this folder.
     """
-    (output / ROWS_FOLDER).mkdir(parents=True, exist_ok=True)
-    with contextlib.ExitStack() as opened:
-        if os.name == "posix":
-            import fcntl
+    rows = output / ROWS_FOLDER
+    rows.mkdir(parents=True, exist_ok=True)
+    if os.name != "posix":
+        yield
+        return
+    import fcntl
 
-            descriptor = os.open(output / ROWS_FOLDER, os.O_RDONLY)
-            opened.callback(os.close, descriptor)  # the lock ends with it, or with this process
+    descriptor = os.open(rows, os.O_RDONLY)  # the lock ends with it, or with this process
+    try:
+        with contextlib.suppress(OSError):  # a file system without locks
             try:
                 fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
                 hint = "wait for its end, or name another folder with -o"
                 raise OutputError("another batch is running in this folder", file=output, hint=hint) from None
-            except OSError:  # a file system without locks
-                pass
-        shutil.rmtree(output / STAGE, ignore_errors=True)
-        (output / STAGE).mkdir()
-        opened.callback(shutil.rmtree, output / STAGE, ignore_errors=True)
         yield
+    finally:
+        os.close(descriptor)
