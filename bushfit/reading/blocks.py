@@ -23,8 +23,10 @@ _NUMERIC = b"0123456789.,+-eEdD \t\r\n"
 _COMPLEX = re.compile(
     r"\(?\s*([+-]?[\d.,]+(?:[eEdD][+-]?\d+)?)\s*([+-]\s*[\d.,]+(?:[eEdD][+-]?\d+)?)\s*\*?\s*[ij]\s*\)?"
 )
-#: Number with a unit: "594.4 N/mm", "±0,5mm", "5.7°".
-_WITH_UNIT = re.compile(r"(?:±|\+/?-)?\s*(?P<number>[+-]?[\d.,]+(?:[eE][+-]?\d+)?)\s*(?P<unit>[^\d\s.,;:][^;]{0,20})")
+#: Number with a unit: "594.4 N/mm", "±0,5mm", "5.7°". Possessive: an exponent belongs to the number, never to the unit.
+_WITH_UNIT = re.compile(
+    r"(?:±|\+/?-)?\s*(?P<number>[+-]?[\d.,]++(?:\s*+[eEdD][+-]?\d++)?+)\s*+(?P<unit>(?:[^\W\d]|[°%‰])[^;]{0,20})"
+)
 #: First rows that are searched for complex numbers and units; chosen: room for remarks.
 _FIRST = 8
 
