@@ -16,6 +16,7 @@ from bushfit.errors import FitError
 from bushfit.fitting.agreement import LeaveOut
 from bushfit.fitting.coordinates import Bounds
 from bushfit.fitting.descent import Descent
+from bushfit.fitting.discrepancy import process_columns
 from bushfit.fitting.model_error import with_model_error
 from bushfit.fitting.preparation import MeasuredTest, split_by_kind
 from bushfit.fitting.problem import FitProblem, FitResult
@@ -68,18 +69,22 @@ def describe(
         start: starting values estimated from the data, because the gap distorts the fitted parameters.
         bounds: limits of parameters inside their general limits.
         before: fit of the starting model, to compare held-out residuals with; None for `fit`.
-        has_candidates: True if known effects explain the gap, so that the gap is certain and its form is known.
+        has_candidates: True if known effects explain the gap, so that its form is known.
 
     Returns:
-        The description; None without a valid correction: if it does not raise the likelihood (with candidates: does not
-        reduce the held-out residuals) or has an error larger than the gap, if the model has a correction already, or if
-        the first harmonics cannot be fitted.
+        The description; None without a valid correction: if it does not reduce the held-out residuals or has an error
+        larger than the gap, if the model has a correction already, or if the first harmonics cannot be fitted.
     """
     if NAME in fit.model.effects:
         return None
     description, harmonic = None, tuple(test.fundamental() for test in fit.data_sets)
-    fitted, correction = with_model_error(fit, bounds, rig, smooth=True, certain=has_candidates)
+    fitted, correction = with_model_error(fit, bounds, rig, certain=True)
     if correction is None or correction.uncertainty >= 1.0:
+        return None
+    plain = replace(fitted, noise_weighted=())  # residuals of the tests with their noise alone
+    closest = plain.reevaluate(fitted.model, harmonic)
+    beside_effects = _hold_out_inside(fit, closest, correction)
+    if (beside_effects.after or 0.0) >= (beside_effects.before or np.inf):
         return None
     half = Z95 * correction.uncertainty * correction.largest
     sentence = f"up to {number(100.0 * correction.largest, 2)} ± {number(100.0 * half, 2)} % of |K|"
@@ -96,30 +101,25 @@ def describe(
             description = Description(law.phase_deg, law.frequency_power, law.amplitude_power, law.sentence)
         sentence += f"; {description.words if description else 'its form is not a power law'}"
     model = replace(fitted.model, effects=(*fit.model.effects, NAME), unnamed=correction)
-    plain = replace(fitted, noise_weighted=())  # residuals of the tests with their noise alone
     after, whole = plain.reevaluate(model, harmonic), plain.reevaluate(model, fit.data_sets)
-    if has_candidates:
-        beside_effects = _hold_out_inside(fit, fitted)
-        if (beside_effects.after or 0.0) >= (beside_effects.before or np.inf):
-            return None
-    holdout = _hold_out_inside(before or fit, fitted)
+    holdout = beside_effects if before is None else _hold_out_inside(before, closest, correction)
     return GapDescription(after, fitted, holdout, description, sentence, _validity(correction, whole))
 
 
-def _hold_out_inside(before: FitResult, fitted: FitResult) -> HoldOut:
+def _hold_out_inside(before: FitResult, closest: FitResult, correction: Unnamed) -> HoldOut:
     """Predict parts of the sweeps inside the tested range from the other parts, without and with the correction.
 
     Args:
         before: fit of the model without the correction.
-        fitted: fit with the correction, treated as a random error of the model.
+        closest: closest fit, without the correction, with loops replaced by their first harmonic.
+        correction: correction of this fit. Its Gaussian process is conditioned on the other parts of the tests alone.
 
     Returns:
         Root mean square residuals, without and with the correction, of every third frequency (or amplitude, where that
         is stepped), of the middle level and of the last repeat of the sweeps.
     """
-    tests = before.data_sets
     chosen: dict[str, dict[MeasuredTest, Array]] = {}
-    for sweep in split_by_kind(tests)[1]:
+    for sweep in split_by_kind(before.data_sets)[1]:
         rank = np.unique(sweep.step, return_inverse=True)[1]
         levels, level = np.unique(sweep.held_value, return_inverse=True)
         last_repeat = (sweep.repeat == sweep.repeat.max()) & (np.ptp(sweep.repeat) > 0)
@@ -131,13 +131,23 @@ def _hold_out_inside(before: FitResult, fitted: FitResult) -> HoldOut:
         for name, mask in masks.items():
             if mask.any():
                 chosen.setdefault(name, {})[sweep] = mask
-    both = [LeaveOut.from_fit(fit.jacobian[fit.moving], fit.residual) for fit in (before, fitted)]
+    columns = process_columns(closest, correction)
+    amounts = np.eye(len(columns), closest.residual.size + len(columns), closest.residual.size)  # rows of their prior
+    amounts[:, : columns.shape[1]] = columns
+    slopes = np.pad(closest.jacobian[closest.moving], ((0, 0), (0, len(columns))))
+    with_process = LeaveOut.from_fit(np.concatenate((slopes, amounts)), np.pad(closest.residual, (0, len(columns))))
+    without_process = LeaveOut.from_fit(before.jacobian[before.moving], before.residual)
+    models = (before, without_process, len(before.moving)), (closest, with_process, len(slopes))
     residuals = dict[str, Array]()
     for name, by_sweep in chosen.items():
-        rows = HoldOutPart.of_tests(name, by_sweep, tests).rows(tests)
-        pairs = [(fit, np.pad(rows, (0, fit.residual.size - rows.size))) for fit in both]
-        if not any(fit.undetermined(mask).any() for fit, mask in pairs):  # else the rest does not determine the model
-            residuals[name] = np.array([fit.predicted(mask, np.arange(mask.size)) for fit, mask in pairs])
+        pairs = []
+        for fit, leave_out, count in models:
+            rows = HoldOutPart.of_tests(name, by_sweep, fit.data_sets).rows(fit.data_sets)
+            rows = np.pad(rows, (0, leave_out.residual.size - rows.size))
+            if not leave_out.undetermined(rows)[:count].any():  # else the rest does not determine the parameters
+                pairs.append(leave_out.predicted(rows, np.arange(rows.size)))
+        if len(pairs) == len(models):
+            residuals[name] = np.array(pairs)
     return HoldOut.from_residuals(residuals)
 
 

@@ -308,3 +308,18 @@ def discrepancies(tests: FittedTests) -> list[Discrepancy]:
     shared = dict.fromkeys([(names,), tuple((name,) for name in names)])
     pairs = product(shared, product(OVER_FREQUENCY, OVER_STRAIN))
     return [Discrepancy.over_tests(tests, groups, lengths, MAXIMUM_NODES) for groups, lengths in pairs]
+
+
+def process_columns(solution: FitResult, correction: Unnamed) -> Array:
+    """Changes of the residuals of a fit due to the Gaussian process of a correction of its model.
+
+    Args:
+        solution: fit of the model without the correction.
+        correction: correction, which determines size, lengths and groups of the process.
+
+    Returns:
+        Change of the n whitened residuals for each of q independent patterns, at one standard deviation, (q, n).
+    """
+    tests, groups = FittedTests(solution), tuple(patch.directions for patch in correction.patches)
+    process = Discrepancy.over_tests(tests, groups, correction.lengths, MAXIMUM_NODES)
+    return tests.residual_changes(correction.size * process.complex_shapes)

@@ -104,7 +104,7 @@ def with_excess_errors(
 
 
 def with_model_error(
-    plain_fit: FitResult, bounds: Bounds, rig: RigSettings = UNSTATED, *, smooth: bool = False, certain: bool = False
+    plain_fit: FitResult, bounds: Bounds, rig: RigSettings = UNSTATED, *, certain: bool = False
 ) -> tuple[FitResult, Unnamed | None]:
     """Refit a model that misses its tests, with an error of the model added to the noise; otherwise keep the fit.
 
@@ -112,7 +112,6 @@ def with_model_error(
         plain_fit: least-squares fit with the noise alone.
         bounds: limits of parameters [SI], inside their default limits.
         rig: accuracy class of the rig, whose errors may explain a misfit.
-        smooth: True to test for smooth discrepancies only.
         certain: True if it is known already that the tests differ from the model by more than noise.
 
     Returns:
@@ -121,7 +120,7 @@ def with_model_error(
     """
     if not plain_fit.names:
         return plain_fit, None
-    if not (certain or (not smooth and _exceeds_noise(plain_fit, rig))):
+    if not (certain or _exceeds_noise(plain_fit, rig)):
         thinned = _thin_sweeps(plain_fit.problem.tests)
         rig_errors = [_errors_of_class(test, rig) for test in thinned]
         if not _is_smooth(FittedTests(plain_fit.reevaluate(plain_fit.model, thinned), rig_errors)):

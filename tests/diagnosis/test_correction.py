@@ -19,6 +19,7 @@ from test_schemas import complaints
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.described import GapDescription, describe
+from bushfit.diagnosis.fits import fit_model
 from bushfit.diagnosis.power_law import PowerLaw, nearest_power_law
 from bushfit.effects.contract import Array, Level
 from bushfit.fitting.prepared_campaign import PreparedCampaign
@@ -88,6 +89,19 @@ def test_what_the_diagnosis_says(measured):
     assert np.all(inside.high - inside.value < 0.01 * inside.value)
     adopted = asked(campaign, found.result.model, max_effects=0, adopt=("rig_compliance",)).result.model
     assert adopted.effects[-1] == "rig_compliance", "the correction is left out, because it would hide what is adopted"
+
+
+def test_held_out_tests_are_predicted_from_the_others(evidence, described):
+    """The reported figure is that of a correction made of the other tests alone."""
+    frequencies = np.unique(evidence.data_sets[0].frequency)
+    third = frequencies[1:-1:3]
+    rest = [test.without(np.flatnonzero(np.isin(test.frequency, third))) for test in evidence.data_sets]
+    other = describe(fit_model(evidence.model, rest, (), {}), RigSettings(), evidence.model.values, {})
+    residuals = [
+        test.residual(other.after.model)[np.tile(np.isin(test.frequency, third), 2)] for test in evidence.data_sets
+    ]
+    part = next(part for part in described.holdout.parts if part.part == "every third frequency")
+    assert part.after == pytest.approx(np.sqrt(np.mean(np.square(np.concatenate(residuals)))), rel=0.1)
 
 
 def test_predictions_use_it_inside_the_range_and_open_outside(result):
