@@ -96,7 +96,7 @@ def line_misfits(sweep: MeasuredSweep, model: Model) -> Iterator[LineMisfit]:
     Yields:
         Mean misfit along a line, over its repeats.
     """
-    ratio = sweep.measured / sweep.stiffness(model) - 1.0
+    ratio = sweep.measured / sweep.response(model) - 1.0
     for held_value in np.unique(sweep.held_value):
         mask = sweep.held_value == held_value
         _, first, index = np.unique(sweep.step[mask], return_index=True, return_inverse=True)

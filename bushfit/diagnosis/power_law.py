@@ -34,6 +34,7 @@ from bushfit.fitting.problem import FitResult
 from bushfit.geometry import STRAINING
 from bushfit.model.covariance import Z95
 from bushfit.model.model import Model
+from bushfit.model.sensitivity import difference_quotients, stepped_values
 from bushfit.units import number
 
 #: Unit of the added stiffness: N/m or N m/rad over displacement, Pa over strain, or a share of the model's stiffness.
@@ -211,7 +212,7 @@ class Term:
         for test, points in self.tests:
             rows = self.fit.residual_rows[test]
             if isinstance(test, MeasuredSweep):
-                residuals[rows] = test.whiten(test.deviation(test.stiffness(model) + added[points]))
+                residuals[rows] = test.whiten(test.deviation(test.response(model) + added[points]))
             else:
                 residuals[rows] += test.residual_change(added[points], model)
         return residuals
@@ -230,7 +231,7 @@ class Term:
         """
         names, place = self.fit.coordinates.names, self.fit.residual_rows
         added, changes = value * self.unit(model), np.concatenate((shapes, 1j * shapes)) * self.unit(model)
-        residuals, rows = self.residual(value, model), np.array(self.fit.problem.jacobian(model))
+        residuals, rows = self.residual(value, model), self.fit.problem.linearise(model)[1]
         slopes = Coordinates.of_parameters(model, names).slopes(model.values)[:, None]
         columns = np.zeros((len(changes), residuals.size))
         for test, points in self.tests:
@@ -238,12 +239,13 @@ class Term:
             residuals[place[test]] -= test.residual_change(added[points], model, added[points])
             share = added[points] if self.measure == "gain" else 0.0  # which stays proportional to the stiffness
             if isinstance(test, MeasuredSweep):
-                stiffness, change = test.stiffness_slopes(model, names)
-                change = test.residual_change((1.0 + share / stiffness) * change, model, added[points])
+                stepped, steps = stepped_values(model, names, test.direction)
+                stiffness, change = difference_quotients(test.response(model, stepped), steps)
+                change = (1.0 + share / stiffness) * change
+                rows[:, place[test]] = slopes * test.residual_change(change, model, added[points])
             else:
-                change = test.residual_change(share * log_slopes(model, test, names), model)
-                change += test.jacobian(model, names)
-            rows[:, place[test]] = slopes * change
+                change = share * log_slopes(model, test, names)
+                rows[:, place[test]] += slopes * test.residual_change(change, model)
         return residuals, rows, columns.reshape(2, len(shapes), -1).swapaxes(0, 1)
 
 

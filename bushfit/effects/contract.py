@@ -255,7 +255,8 @@ class Branch(Effect):
         stress: (values, strain history) -> stress [Pa].
         uses: names of the paper's parameters that the branch reads.
         size: name of the parameter that the modulus of a linear viscoelastic branch is proportional to, so that Maxwell
-            arms can replace the branch; None for other branches.
+            arms can replace the branch; None for other branches. Over a steady cycle, the modulus of a linear branch
+            gives every harmonic of the stress, mean included, and `stress` is not used.
     """
 
     level: Level = Level.MATERIAL
@@ -364,19 +365,6 @@ def scaled_response(
     """
     *motion, setting = motion_and_setting
     return factor(p, setting) * below(*motion)
-
-
-def linear_stress(modulus: Callable[[Values, Array, Array], Array], p: Values, history: History) -> Array:
-    """Steady stress [Pa] of a linear branch over one cycle: harmonic h is 2 mu(h omega) times harmonic h of the strain.
-
-    Args:
-        modulus: complex modulus mu of the branch [Pa] for parameter values, angular frequencies [rad/s] and strain
-            amplitude [1]; must be finite at omega = 0, where it multiplies the mean strain.
-        p: parameter values by name.
-        history: strain over a steady cycle, (..., n).
-    """
-    transfer = 2.0 * modulus(p, history.harmonics, history.amplitude)
-    return np.fft.irfft(transfer * history.spectrum, n=history.value.shape[-1])
 
 
 def harmonic_stress(modulus: Callable[[Values, Array, Array], Array], p: Values, history: History) -> Array:

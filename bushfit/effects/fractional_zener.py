@@ -5,7 +5,7 @@ from functools import lru_cache
 import numpy as np
 from scipy.fft import next_fast_len
 
-from bushfit.effects.contract import REFERENCE_FREQUENCY, Array, History, Values, linear_stress
+from bushfit.effects.contract import REFERENCE_FREQUENCY, Array, History, Values
 from bushfit.effects.springpot import power_of_rate
 
 #: Size of the last sample's echo in the kernel, relative: between the rounding and the wrapping of its transform.
@@ -53,7 +53,7 @@ def _circle(length: int) -> tuple[Array, Array]:
 
 
 def stress(p: Values, history: History) -> Array:
-    """Change of the springpot's stress due to a spring in series.
+    """Change of the springpot's stress due to a spring in series, from rest.
 
     Args:
         p: parameter values by name: c [1], modulus of the springpot over that of the spring at 25 Hz; and of the
@@ -71,8 +71,6 @@ def stress(p: Values, history: History) -> Array:
         v = (1 - z)^alpha and k = tau^alpha/step^alpha, from its values on a circle |z| < 1 (C. Lubich, Numer. Math. 52
         (1988) 129); v (1 + alpha/2 (1 - z)) replaces v in the second order of `springpot.fractional_derivative`.
     """
-    if history.periodic:
-        return linear_stress(modulus, p, history)
     count = history.value.shape[-1]
     alpha, scaled, step = (np.atleast_1d(value) for value in (p["alpha"], _relaxation_time_power(p), history.step))
     length = next_fast_len(2 * count, real=True)

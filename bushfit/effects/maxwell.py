@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from bushfit.effects.contract import Array, History, Value, Values, linear_stress
+from bushfit.effects.contract import Array, History, Value, Values
 
 
 def modulus(p: Values, omega: Array, strain: Array) -> Array:
@@ -67,7 +67,7 @@ def recursion(ratio: complex, added: Array) -> Array:
 
 
 def stress(p: Values, history: History) -> Array:
-    """Stress of a Maxwell arm, a spring and a dashpot in series.
+    """Stress of a Maxwell arm, a spring and a dashpot in series, from rest.
 
     Args:
         p: parameter values by name: modulus mu1 [Pa] of the spring, and relaxation time tau [s].
@@ -79,6 +79,4 @@ def stress(p: Values, history: History) -> Array:
     Notes:
         Solution s of s + tau ds/dt = 2 mu1 tau de/dt.
     """
-    if history.periodic:
-        return linear_stress(modulus, p, history)
     return 2.0 * p["mu1"] * relax(1.0 / p["tau"], history.value, history.step)

@@ -5,7 +5,7 @@ from functools import lru_cache
 import numpy as np
 from scipy.fft import next_fast_len
 
-from bushfit.effects.contract import Array, History, Value, Values, linear_stress
+from bushfit.effects.contract import Array, History, Value, Values
 
 
 def power_of_rate(alpha: Array, omega: Array) -> Array:
@@ -79,7 +79,7 @@ def _weight_spectrum(alpha: float, count: int, length: int) -> Array:
 
 
 def stress(p: Values, history: History) -> Array:
-    """Stress of the springpot.
+    """Stress of the springpot from rest.
 
     Args:
         p: parameter values by name: springpot constant m [Pa s^alpha], order alpha [1].
@@ -91,6 +91,4 @@ def stress(p: Values, history: History) -> Array:
     Notes:
         s = m D^alpha e, with the fractional derivative D^alpha (Garcia Tarrago et al. 2007, Eqs. 1 and 3).
     """
-    if history.periodic:
-        return linear_stress(modulus, p, history)
     return p["m"] * fractional_derivative(p["alpha"], history)

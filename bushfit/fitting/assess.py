@@ -79,7 +79,7 @@ def covariance(
     bases = []
     for stage in stages:
         equations = slice(begin, begin + len(stage.names))
-        slope = FitProblem(model, stage.tests, names).jacobian(model)
+        slope = FitProblem(model, stage.tests, names).linearise(model)[1]
         basis = np.linalg.qr(slope[equations].T)[0]
         system[equations] = basis.T @ slope.T
         excess = np.ones(len(basis))  # 1 in the rows of priors

@@ -98,8 +98,7 @@ class Descent:
         """
         point = problem.start
         model = problem.model.with_values(problem.coordinates.values(point))
-        slopes = problem.jacobian(model)
-        misfit = problem.residual(model)  # which mostly came with the derivatives
+        misfit, slopes = problem.linearise(model)
         if not np.all(np.isfinite(misfit)) or not np.all(np.isfinite(slopes)):
             raise FitError(
                 "the model has no finite response to these tests",
@@ -155,15 +154,18 @@ class Descent:
             try:
                 model = fit.model.with_values(problem.coordinates.values(point))
                 with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-                    # derivatives bring the response along; after a step that failed the response is asked for alone
-                    # first, and what is left of a last step is too short for them to change
-                    slopes = None if converged or has_failed else problem.jacobian(model)
-                    reached = problem.residual(model)
+                    # after a step that failed the residuals are computed alone first, and the last step is too short
+                    # for the derivatives to change
+                    slopes: Array | None = None
+                    if converged or has_failed:
+                        reached = problem.residual(model)
+                    else:
+                        reached, slopes = problem.linearise(model)
                     fall = fit.chi_square - float(reached @ reached)
                     if expected <= 0.0 or not fall > _LEAST_GAIN_RATIO * expected:
                         continue
                     if slopes is None:
-                        slopes = fit.jacobian if converged else problem.jacobian(model)
+                        slopes = fit.jacobian if converged else problem.linearise(model)[1]
             except ModelError:  # no response there
                 continue
             if np.all(np.isfinite(slopes)):

@@ -159,8 +159,8 @@ def _error_directions(model: Model, data_sets: Sequence[MeasuredTest], names: Se
         Relative change of each parameter due to each of the k independent errors, (k, k), one column per error. The sum
         of squares along a row is the variance of a parameter; the sum of the columns' outer products is the covariance.
     """
-    slopes = FitProblem(model, data_sets, names).jacobian(model, with_priors=False)
-    slopes *= relative_sizes(model, names)[:, None]
+    _, slopes = FitProblem(model, data_sets, names).linearise(model)
+    slopes = slopes[:, : sum(test.size for test in data_sets)] * relative_sizes(model, names)[:, None]
     values, vectors = np.linalg.eigh(slopes @ slopes.T)
     return np.asarray(vectors / np.sqrt(np.maximum(values, np.finfo(float).eps * values.max())))
 

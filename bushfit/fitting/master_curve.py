@@ -59,7 +59,7 @@ def master_curve(result: Result, sweeps: Sequence[MeasuredSweep]) -> tuple[Shift
         if can_shift(sweep.test):
             pace = np.broadcast_to(model.shift_factor(sweep.conditions), sweep.frequency.shape)
             at_reference = model.stiffness(sweep.direction, sweep.frequency * pace, sweep.amplitude)
-            reduced = sweep.measured * at_reference / sweep.stiffness(model)
+            reduced = sweep.measured * at_reference / sweep.response(model)
             temperature = float(np.mean(sweep.temperature))
             shift, error = (float(value.item()) for value in shift_factors(result, np.array([temperature])))
             further, unsure = _further_shift(model, sweep)

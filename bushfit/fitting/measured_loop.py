@@ -16,7 +16,6 @@ from bushfit.fitting.row_noise import RowNoise
 from bushfit.fitting.shared_errors import SharedErrors
 from bushfit.model.model import Model
 from bushfit.model.result import Outlier
-from bushfit.model.sensitivity import force_and_slopes
 from bushfit.reading.measurement import Loop
 from bushfit.reduction.harmonics import as_complex, basis, least_squares
 
@@ -181,10 +180,6 @@ class MeasuredLoop(MeasuredBase):
         """Standard deviation of a row's noise relative to half the force range, or of a sweep point relative to |K|."""
         return self.noise / self.half_range
 
-    def weighted(self, weight: Array) -> Self:
-        """Return the test with the weight of each of its n points multiplied by a factor, (n,)."""
-        return replace(self, weights=self.weights * weight)
-
     def fundamental(self) -> Self:
         """Return the loop compared by the first harmonic of its force only."""
         return replace(self, fundamental_only=True)
@@ -195,35 +190,20 @@ class MeasuredLoop(MeasuredBase):
 
     def noise_free(self, model: Model) -> Self:
         """Return the test with the response of a model in place of the measured response."""
-        force = self.force(model)
+        force = self.response(model)
         return replace(self, measured_force=force, half_range=float(np.ptp(force)) / 2.0)
 
-    def force(self, model: Model, values: Values | None = None) -> Array:
-        """Model force at the n rows [N or N m], (..., n); `values` replace parameters of the model, (...) or scalar."""
-        if values is None and (force := self._recall("force", model)) is not None:
+    def response(self, model: Model, values: Values | None = None) -> Array:
+        """Force of a model at the n rows, (..., n) [N or N m]; see `MeasuredBase`."""
+        if values is None and (force := self.recall("response", model)) is not None:
             return force
-        history = self.history(model.is_transient)
-        force = model.force(self.direction, history, kind="loop", values=values, conditions=self.test_conditions)
-        force = self.interpolate_at_rows(force) + (self.datum or 0.0)
-        return force if values is not None else self._keep("force", model, (), force)
+        stack = model.stack(model.setting(self.direction, "loop", self.conditions), values)
+        force = self.interpolate_at_rows(stack.force(self.history(model.is_transient))) + (self.datum or 0.0)
+        return force if values is not None else self.keep("response", model, force)
 
-    def residual(self, model: Model, values: Values | None = None) -> Array:
-        """Whitened residuals: model minus measured force in units of noise, (..., size); see `MeasuredBase`."""
-        return self.whiten((self.force(model, values) - self.measured_force) * self._per_noise)
-
-    def jacobian(self, model: Model, names: Sequence[str]) -> Array:
-        """Derivatives of the whitened residuals with respect to parameter values [SI]; cached.
-
-        Returns:
-            Derivatives, (len(names), size).
-        """
-        if (rows := self._recall("jacobian", model, tuple(names))) is not None:
-            return rows
-        history = self.history(model.is_transient)
-        force, slopes = force_and_slopes(model, self.direction, history, names, self.test_conditions)
-        self._keep("force", model, (), self.interpolate_at_rows(force) + (self.datum or 0.0))
-        rows = self.whiten(self.interpolate_at_rows(slopes) * self._per_noise)
-        return self._keep("jacobian", model, tuple(names), rows)
+    def residual_of(self, response: Array) -> Array:
+        """Whitened residuals of a modelled force, (..., size); see `MeasuredBase`."""
+        return self.whiten((response - self.measured_force) * self._per_noise)
 
     def residual_change(self, change: Array, model: Model, added: Array | float = 0.0) -> Array:
         """Change of the whitened residuals, (..., size), due to a small change of the model's stiffness.
@@ -239,7 +219,7 @@ class MeasuredLoop(MeasuredBase):
 
     def relative_difference(self, model: Model) -> Array:
         """Model minus measured force at each row, relative to half the measured force range, (1, n)."""
-        return ((self.force(model) - self.measured_force) / self.half_range)[None]
+        return ((self.response(model) - self.measured_force) / self.half_range)[None]
 
     def relative(self, model: Model) -> Array:
         """Magnitude of the relative difference at each row, less its mean (the zero of a load cell is unknown)."""
@@ -248,7 +228,7 @@ class MeasuredLoop(MeasuredBase):
 
     def misfit(self, model: Model) -> Array:
         """Model minus measured force at each row, in units of the row's noise, (n,); 0 at rows without weight."""
-        return (self.force(model) - self.measured_force) * self._per_noise
+        return (self.response(model) - self.measured_force) * self._per_noise
 
     def distance(self, model: Model) -> Array:
         """Absolute difference between model and measured force at each row, in units of noise, (n,)."""
@@ -256,7 +236,7 @@ class MeasuredLoop(MeasuredBase):
 
     def displayed_residual(self, model: Model) -> Array:
         """Residuals for charts, model minus measured in units of noise, (size,): also of points without weight."""
-        distance = (self.force(model) - self.measured_force) / self.noise
+        distance = (self.response(model) - self.measured_force) / self.noise
         return np.where(self.weights > 0.0, self.misfit(model), distance)
 
     def outlier_indices(self, model: Model) -> Array:

@@ -1,6 +1,6 @@
 """One measured sweep with its noise: dynamic stiffness over frequency and amplitude."""
 
-from collections.abc import Hashable, Iterator, Sequence
+from collections.abc import Hashable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Self
@@ -17,7 +17,6 @@ from bushfit.fitting.shared_errors import SharedErrors
 from bushfit.fitting.whitening import Whitening
 from bushfit.model.model import Model
 from bushfit.model.result import Outlier
-from bushfit.model.sensitivity import stiffness_and_slopes
 from bushfit.reading.measurement import Sweep
 from bushfit.units import number
 
@@ -124,10 +123,6 @@ class MeasuredSweep(MeasuredBase):
         """Standard deviation of a point relative to |K|: root mean square over gain and phase of all lines."""
         return float(np.sqrt(np.mean(np.square(list(self.noise.random.values())))))
 
-    def weighted(self, weight: Array) -> Self:
-        """Return the sweep with the weight of each of its n points multiplied by a factor, (n,)."""
-        return replace(self, weights=self.weights * weight)
-
     def without(self, points: Array) -> Self:
         """Return the sweep with weight 0 at the points with the given indices."""
         return self.weighted(np.isin(np.arange(self.frequency.size), points, invert=True)) if points.size else self
@@ -144,7 +139,7 @@ class MeasuredSweep(MeasuredBase):
     def noise_free(self, model: Model) -> Self:
         """Return the sweep with the stiffness of a model in place of the measured stiffness."""
         stiffness = self.test.stiffness.copy()
-        stiffness[self.order] = self.stiffness(model)
+        stiffness[self.order] = self.response(model)
         return replace(self, test=replace(self.test, stiffness=stiffness))
 
     @cached_property
@@ -163,38 +158,17 @@ class MeasuredSweep(MeasuredBase):
         """Zero-to-peak amplitude that the rig reached at each point [m or rad], (n,), where models are evaluated."""
         return self.test.amplitude_reached[self.order]
 
-    def stiffness(self, model: Model, values: Values | None = None) -> Array:
-        """Stiffness of a model at the points of the sweep, evaluated once for all repeats of a point.
-
-        Args:
-            model: model to evaluate.
-            values: parameter values in place of the model's own; leading axes are added to the result.
-
-        Returns:
-            Complex stiffness, (..., n) [N/m or N m/rad].
-        """
-        if values is None and (stiffness := self._recall("stiffness", model)) is not None:
+    def response(self, model: Model, values: Values | None = None) -> Array:
+        """Stiffness of a model at the points of the sweep, (..., n) [N/m or N m/rad]; see `MeasuredBase`."""
+        if values is None and (stiffness := self.recall("response", model)) is not None:
             return stiffness
-        points = self.direction, self.frequency, self.reached
-        stiffness = model.stiffness(*points, values=values, conditions=self.conditions)
-        return stiffness if values is not None else self._keep("stiffness", model, (), stiffness)
+        stack = model.stack(model.setting(self.direction, "sweep", self.conditions), values)
+        stiffness = stack(2.0 * np.pi * self.frequency, self.reached)
+        return stiffness if values is not None else self.keep("response", model, stiffness)
 
-    def stiffness_slopes(self, model: Model, names: Sequence[str]) -> tuple[Array, Array]:
-        """Stiffness of a model at the points of the sweep, complex (n,), and its parameter derivatives, (k, n)."""
-        points = self.direction, self.frequency, self.reached
-        stiffness, slopes = stiffness_and_slopes(model, *points, names, conditions=self.conditions)
-        return self._keep("stiffness", model, (), stiffness), slopes
-
-    def residual(self, model: Model, values: Values | None = None) -> Array:
-        """Whitened residuals: model minus measured in units of noise, (..., 2 n); see `MeasuredBase`."""
-        return self.whiten(self.deviation(self.stiffness(model, values)))
-
-    def jacobian(self, model: Model, names: Sequence[str]) -> Array:
-        """Derivatives of whitened residuals with respect to parameters [SI], (len(names), 2 n); the last are cached."""
-        if (rows := self._recall("jacobian", model, tuple(names))) is not None:
-            return rows
-        rows = self.residual_change(self.stiffness_slopes(model, names)[1], model)
-        return self._keep("jacobian", model, tuple(names), rows)
+    def residual_of(self, response: Array) -> Array:
+        """Whitened residuals of a modelled stiffness, (..., 2 n); see `MeasuredBase`."""
+        return self.whiten(self.deviation(response))
 
     def residual_change(self, change: Array, model: Model, added: Array | float = 0.0) -> Array:
         """Change of the whitened residuals due to a small change of the model's stiffness.
@@ -207,7 +181,7 @@ class MeasuredSweep(MeasuredBase):
         Returns:
             Changes, (..., 2 n): of n gains, then of n phases.
         """
-        stiffness = self.stiffness(model) + added
+        stiffness = self.response(model) + added
         relative = change / stiffness
         if self.residuals == "complex":
             return self.whiten(relative)
@@ -291,7 +265,7 @@ class MeasuredSweep(MeasuredBase):
 
     def relative_difference(self, model: Model) -> Array:
         """Model minus measured stiffness relative to the measured |K|: real and imaginary part, (2, n)."""
-        difference = (self.stiffness(model) - self.measured) / np.abs(self.measured)
+        difference = (self.response(model) - self.measured) / np.abs(self.measured)
         return np.stack((difference.real, difference.imag))
 
     def scaled_distance(self, deviation: Array, *, shared: bool = True) -> Array:
@@ -308,18 +282,18 @@ class MeasuredSweep(MeasuredBase):
 
         The likeliest error that all points of a run share is subtracted first.
         """
-        return self.scaled_distance(self.deviation(self.stiffness(model))) / np.sqrt(2.0)
+        return self.scaled_distance(self.deviation(self.response(model))) / np.sqrt(2.0)
 
     def displayed_residual(self, model: Model) -> Array:
         """Residuals for charts in units of noise, (2 n,), whitened; points without weight are in units of scatter."""
-        deviation = self.deviation(self.stiffness(model))
+        deviation = self.deviation(self.response(model))
         distances = self.covariance.scaled(deviation).ravel()
         return np.where(np.tile(self.weights > 0.0, 2), self.whiten(deviation), distances)
 
     def outlier_indices(self, model: Model) -> Array:
         """Indices of the points that are farther from the model and from their neighbours than noise explains, (k,)."""
         points, freedom = np.stack((self.frequency, self.amplitude)), self.noise.scatter_freedom or np.inf
-        deviation = self.deviation(self.stiffness(model))
+        deviation = self.deviation(self.response(model))
         return outlying_points(deviation, self.scaled_distance, self.block_starts, points, freedom)
 
     def outliers(self, points: Array, model: Model) -> Iterator[Outlier]:

@@ -1,7 +1,6 @@
 """Base class of measured loops and sweeps: one test with its noise."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar, Self
@@ -55,6 +54,21 @@ class MeasuredBase(ABC):
         """
 
     @abstractmethod
+    def response(self, model: Model, values: Values | None = None) -> Array:
+        """Response of a model in this test: complex stiffness at each point of a sweep, or force at each row of a loop.
+
+        Args:
+            model: model to evaluate; the last response without `values` is cached.
+            values: parameter values [SI] in place of the model's; leading axes are added to the result.
+
+        Returns:
+            Stiffness [N/m or N m/rad] or force [N or N m], (..., n).
+        """
+
+    @abstractmethod
+    def residual_of(self, response: Array) -> Array:
+        """Whitened residuals, (..., size), of a modelled `response`, (..., n): modelled minus measured."""
+
     def residual(self, model: Model, values: Values | None = None) -> Array:
         """Whitened residuals: model minus measured in units of noise; independent with variance 1 for a true model.
 
@@ -65,19 +79,12 @@ class MeasuredBase(ABC):
         Returns:
             Residuals in the force of each row, (..., size); of a sweep of n points, n gains, then n phases.
         """
-
-    @abstractmethod
-    def jacobian(self, model: Model, names: Sequence[str]) -> Array:
-        """Derivatives of whitened residuals with respect to parameters [SI], (len(names), size); cached once."""
+        return self.residual_of(self.response(model, values))
 
     @property
     @abstractmethod
     def unit_model_error(self) -> SharedErrors:
         """Model error of 100 %, as errors that the residuals share."""
-
-    @abstractmethod
-    def with_independent_noise(self) -> Self:
-        """Return the test with independent noise alone, without errors that its residuals share."""
 
     def with_model_error(self, size: float) -> Self:
         """Return the test with a model error of this size, relative to |K| or half a loop's force range."""
@@ -90,22 +97,9 @@ class MeasuredBase(ABC):
         """Model error of the test, as errors that the residuals share."""
         return self.unit_model_error.scaled(self.model_error)
 
-    def error_products(self, model: Model, names: Sequence[str]) -> tuple[Array, Array, Array]:
-        """Inner products that determine the likelihood of the size of a model error.
-
-        Args:
-            model: model near the minimum.
-            names: names of its k fitted parameters.
-
-        Returns:
-            Inner products of the m = k + 1 rows of residuals and derivatives in units of the independent noise, (m, m);
-            their components along the c independent directions of the model error, (m, c); and the variance along each
-            direction if the error has size 1, (c,).
-        """
-        test, error = self.with_independent_noise(), self.unit_model_error
-        slopes = test.jacobian(model, names)  # which keeps the response for the residuals
-        rows = np.vstack((test.residual(model), slopes))
-        return rows @ rows.T, rows @ error.directions * error.deviations, np.square(error.deviations)
+    def weighted(self, weight: Array) -> Self:
+        """Return the test with the weight of each of its n points multiplied by a factor, (n,)."""
+        return replace(self, weights=self.weights * weight)
 
     def misfit(self, model: Model) -> Array:
         """Model minus measured in units of noise, (size,), for tables: whitened for a sweep, row by row for a loop."""
@@ -162,22 +156,22 @@ class MeasuredBase(ABC):
 
     @cached_property
     def _cache(self) -> dict[str, tuple[Model, Any, Array]]:
-        """Cache for `_recall` and `_keep`: by name of the quantity, its model, parameter names and last array."""
+        """Cache for `recall` and `keep`: by name of the quantity, its model, parameter names and last array."""
         return {}
 
-    def _recall(self, key: str, model: Model, names: Any = ()) -> Array | None:
-        """Return the array that `_keep` cached for the same key, model and parameter names; None if there is none."""
+    def recall(self, key: str, model: Model, names: Any = ()) -> Array | None:
+        """Return the array that `keep` cached for the same key, model and parameter names; None if there is none."""
         last = self._cache.get(key)
         return last[2] if last and last[0] is model and last[1] == names else None
 
-    def _keep(self, key: str, model: Model, names: Any, values: Array) -> Array:
+    def keep(self, key: str, model: Model, values: Array, names: Any = ()) -> Array:
         """Cache an array, read-only, for the next call with the same key, model and parameter names, and return it.
 
         Args:
-            key: name of the cached quantity, such as "force" or "jacobian".
+            key: name of the cached quantity: "response", or "rows" (residuals and derivatives).
             model: model that the values belong to.
-            names: names of the parameters of a Jacobian; empty for a response.
             values: array to cache.
+            names: names of the parameters of the derivatives.
         """
         values.flags.writeable = False
         self._cache[key] = model, names, values

@@ -29,7 +29,7 @@ from bushfit.effects.contract import Array
 from bushfit.effects.unnamed import Unnamed
 from bushfit.errors import FitError, ModelError
 from bushfit.fitting.assess import excess_chi_square
-from bushfit.fitting.coordinates import ROUNDING, Bounds, Coordinates, prior_covariance, prior_rows
+from bushfit.fitting.coordinates import ROUNDING, Bounds, Coordinates, prior_covariance
 from bushfit.fitting.descent import TOLERANCE, Descent
 from bushfit.fitting.discrepancy import (
     COMPOUND_LENGTHS,
@@ -197,13 +197,12 @@ def likeliest_model_error(model: Model, data_sets: Sequence[MeasuredTest], names
     """
     from scipy.optimize import minimize_scalar  # slow to import, and only a model that misses its tests needs it
 
-    parts = zip(*(data_set.error_products(model, names) for data_set in data_sets), strict=True)
-    products_of_tests, components_of_tests, variances = parts
-    scale = np.append(1.0, Coordinates.of_parameters(model, names).slopes(model.values))
-    of_priors = np.vstack(prior_rows(model, names))
-    products = np.sum(products_of_tests, axis=0) * np.outer(scale, scale) + of_priors @ of_priors.T
-    components = np.concatenate(components_of_tests, axis=1) * scale[:, None]
-    variance = np.concatenate(variances)
+    problem = FitProblem(model, [test.with_independent_noise() for test in data_sets], names)
+    rows = np.vstack(problem.linearise(model))
+    errors = [(test.unit_model_error, block) for test, block in zip(data_sets, residual_slices(data_sets), strict=True)]
+    products = rows @ rows.T
+    components = np.hstack([rows[:, block] @ error.directions * error.deviations for error, block in errors])
+    variance = np.concatenate([np.square(error.deviations) for error, _ in errors])
 
     def cost(log_size: float) -> float:
         """Minus twice the log of the restricted likelihood, given the natural log of the model error's size.

@@ -16,6 +16,7 @@ from bushfit.fitting.shared_errors import SharedErrors
 from bushfit.model.covariance import Z95
 from bushfit.model.model import Model
 from bushfit.model.result import End, Outlier
+from bushfit.model.sensitivity import difference_quotients, stepped_values
 
 #: Smallest distance of the start values from the bounds, relative to the distance between the bounds: the conversion
 #: between values and coordinates rounds.
@@ -70,33 +71,37 @@ class FitProblem:
 
     def residual(self, model: Model) -> Array:
         """Whitened residuals of the tests, then of the p priors of the model, (n + p,)."""
-        by_test = list[Array]()
-        for test in self.tests:
-            by_test.append(test.residual(model))
-        rows = np.concatenate((*by_test, prior_rows(model, ())[0]))
+        rows = np.concatenate((*(test.residual(model) for test in self.tests), prior_rows(model, ())[0]))
         return self.shared_error.whiten(rows) if self.shared_error else rows
 
-    def jacobian(self, model: Model, *, with_priors: bool = True) -> Array:
-        """Derivatives of the whitened residuals with respect to the coordinates of the k free parameters.
+    def linearise(self, model: Model) -> tuple[Array, Array]:
+        """Whitened residuals, and their derivatives with respect to the coordinates of the k free parameters.
 
         Args:
             model: model at whose values the derivatives are taken.
-            with_priors: False to leave out the residuals of the p priors of the model.
 
         Returns:
-            Derivatives, (k, n + p) or (k, n).
+            Residuals of the n points and of the p priors of the model, (n + p,), and their derivatives, (k, n + p).
         """
         free, varied = len(self.names), (*self.names, *model.tied)
-        by_test = list[Array]()
+        residuals, slopes = list[Array](), list[Array]()
         for test in self.tests:
-            by_test.append(test.jacobian(model, varied))
-        slopes = np.concatenate(by_test, axis=-1)
+            if (rows := test.recall("rows", model, varied)) is None:
+                values, steps = stepped_values(model, varied, test.direction)
+                stepped = test.residual_of(test.response(model, values))
+                rows = test.keep("rows", model, np.vstack(difference_quotients(stepped, steps)), varied)
+            residuals.append(rows[0])
+            slopes.append(rows[1:])
+        jacobian = np.concatenate(slopes, axis=-1)
         if model.tied:
-            slopes = slopes[:free] + model.constraints.slopes(model.values, self.names) @ slopes[free:]
-        slopes *= self.coordinates.slopes(model.values)[:, None]
-        if with_priors and model.constraints.priors:
-            slopes = np.concatenate((slopes, prior_rows(model, self.names)[1]), axis=-1)
-        return self.shared_error.whiten(slopes) if self.shared_error else slopes
+            jacobian = jacobian[:free] + model.constraints.slopes(model.values, self.names) @ jacobian[free:]
+        jacobian *= self.coordinates.slopes(model.values)[:, None]
+        of_priors, prior_slopes = prior_rows(model, self.names)
+        residual = np.concatenate((*residuals, of_priors))
+        jacobian = np.concatenate((jacobian, prior_slopes), axis=-1)
+        if self.shared_error:
+            return self.shared_error.whiten(residual), self.shared_error.whiten(jacobian)
+        return residual, jacobian
 
     @property
     def start(self) -> Array:
@@ -246,5 +251,5 @@ class FitResult:
             copied from this result.
         """
         problem = replace(self.problem, tests=tests, shared_error=None)
-        slopes = problem.jacobian(model)
-        return replace(self, problem=problem, model=model, residual=problem.residual(model), jacobian=slopes)
+        residual, jacobian = problem.linearise(model)
+        return replace(self, problem=problem, model=model, residual=residual, jacobian=jacobian)

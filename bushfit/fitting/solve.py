@@ -62,7 +62,7 @@ def solve_with_lmfit(problem: FitProblem) -> FitResult:
             lambda parameters: problem.residual(model_of(parameters)),
             list(free.values()),  # which lmfit takes as they are, without a copy
             "leastsq",
-            Dfun=lambda parameters: problem.jacobian(model_of(parameters)),
+            Dfun=lambda parameters: problem.linearise(model_of(parameters))[1],
             col_deriv=True,
             gtol=0.0,
             ftol=TOLERANCE,
@@ -73,7 +73,7 @@ def solve_with_lmfit(problem: FitProblem) -> FitResult:
         if not fit.aborted:
             best = model_of(fit.params)
             at_bound = problem.at_bound(problem.coordinates.point(best.values))
-            return FitResult(problem, best, problem.residual(best), problem.jacobian(best), int(fit.nfev), at_bound)
+            return FitResult(problem, best, *problem.linearise(best), int(fit.nfev), at_bound)
     return Descent.start(problem, TOLERANCE).run().solution
 
 

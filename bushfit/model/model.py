@@ -299,10 +299,8 @@ class Model:
         amplitude = np.asarray(amplitude, dtype=float)
         if omega.shape != amplitude.shape:
             omega, amplitude = np.broadcast_arrays(omega, amplitude)
-        points = np.atleast_1d(omega)
-        stiffness = self.stack(self.setting(direction, kind, conditions), values)(points, np.atleast_1d(amplitude))
-        if stiffness.shape[-points.ndim :] != points.shape:
-            stiffness = stiffness + np.zeros(points.shape)
+        stack = self.stack(self.setting(direction, kind, conditions), values)
+        stiffness = stack(np.atleast_1d(omega), np.atleast_1d(amplitude))
         return stiffness if omega.ndim else stiffness[..., 0]
 
     def force(

@@ -50,8 +50,8 @@ def stiffness_and_slopes(
     array([[0.3634+0.j]])
     """
     values, steps = stepped_values(model, names, direction)
-    stiffness = model.stiffness(direction, frequency, amplitude, kind=kind, values=values, conditions=conditions)
-    return difference_quotients(stiffness, steps)
+    stack = model.stack(model.setting(direction, kind, conditions), values)
+    return difference_quotients(stack(2.0 * np.pi * frequency, amplitude), steps)
 
 
 def force_and_slopes(
@@ -70,8 +70,8 @@ def force_and_slopes(
         Force [N or N m], (n,), and its derivatives per SI unit of each parameter, (k, n).
     """
     values, steps = stepped_values(model, names, direction)
-    force = model.force(direction, displacement, kind="loop", values=values, conditions=conditions)
-    return difference_quotients(force, steps)
+    stack = model.stack(model.setting(direction, "loop", conditions), values)
+    return difference_quotients(stack.force(displacement), steps)
 
 
 def stepped_values(model: Model, names: Sequence[str], place: Place) -> tuple[Values, Array]:

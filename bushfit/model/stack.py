@@ -78,7 +78,7 @@ class Stack:
         strain = amplitude * model.unit_strain(place)
         if self.modified and model.structure.modifiers:
             values = self.adjusted_values(omega, amplitude, strain)
-        omega, modulus = omega * model.shift_factor(self.setting.conditions, values), np.zeros(1)
+        omega, modulus = omega * model.shift_factor(self.setting.conditions, values), np.zeros(omega.shape)
         for branch in model.structure.branches:
             modulus = modulus + branch.modulus(values_for_effect(branch, values), omega, strain)
         return model.stiffness_per_modulus(place) * modulus
@@ -122,8 +122,15 @@ class Stack:
             values = self.adjusted_values(omega, displacement.amplitude, strain.amplitude)
             if any(modifier.shift_factor for modifier in structure.modifiers):
                 strain = strain.faster(model.shift_factor(setting.conditions, self.values))
+        transfer: Any = 0.0  # stress over strain of the linear branches at each harmonic of a steady cycle
         for branch in structure.branches:
-            stress = stress + branch.stress(values_for_effect(branch, values), strain)
+            branch_values = values_for_effect(branch, values)
+            if branch.size and strain.periodic:
+                transfer = transfer + 2.0 * branch.modulus(branch_values, strain.harmonics, strain.amplitude)
+            else:
+                stress = stress + branch.stress(branch_values, strain)
+        if np.ndim(transfer):
+            stress = stress + np.fft.irfft(transfer * strain.spectrum, n=strain.value.shape[-1])
         for modifier in structure.modifiers:
             if modifier.stress:
                 stress = stress + modifier.stress(values_for_effect(modifier, self.values), strain, setting)

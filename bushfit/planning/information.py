@@ -265,7 +265,7 @@ def relative_slopes(knowledge: Knowledge, data_sets: Sequence[MeasuredTest]) -> 
     typical = np.array([parameter.typical for parameter in bounded.parameters]) / bounded.slopes(model.values)
     sizes = np.concatenate((relative_sizes(model, knowledge.names), typical))
     problem = FitProblem(model, data_sets, (*knowledge.names, *knowledge.bounded))
-    return problem.jacobian(model, with_priors=False) * sizes[:, None]
+    return problem.linearise(model)[1][:, : sum(test.size for test in data_sets)] * sizes[:, None]
 
 
 def rival_chi_squares(rivals: Sequence[Information]) -> Array:

@@ -245,7 +245,7 @@ def loops_table(model: Model, data_sets: Sequence[MeasuredLoop]) -> pd.DataFrame
                     "frequency [Hz]": data_set.frequency[0],
                     displacement_header(place): series(data_set.coefficients, data_set.phase) * length,
                     force: data_set.measured_force * factor,
-                    f"model {force}": data_set.force(model) * factor,
+                    f"model {force}": data_set.response(model) * factor,
                     "residual [noise]": -data_set.displayed_residual(model),
                     "outlier": np.where(np.isin(np.arange(data_set.phase.size), outliers), "yes", "no"),
                 }
@@ -269,7 +269,7 @@ def sweeps_table(model: Model, data_sets: Sequence[MeasuredSweep]) -> pd.DataFra
     """
     tables = []
     for data_set in data_sets:
-        place, modelled = data_set.direction, data_set.stiffness(model)
+        place, modelled = data_set.direction, data_set.response(model)
         gain, phase = np.split(-data_set.displayed_residual(model), 2)
         tables.append(
             pd.DataFrame(

@@ -21,7 +21,7 @@ from bushfit.geometry import Direction
 from bushfit.model.model import FIVE, Model
 from bushfit.model.result import Misfit, Result
 from bushfit.reading.measurement import Sweep
-from tests.fits import solve
+from tests.fits import jacobian, solve
 
 LEVELS = (1e-4, 2e-4, 5e-4)
 
@@ -73,7 +73,8 @@ def test_what_wrong_weights_cost_is_that_of_a_mean_of_two_groups(paper_model):
         return [replace(each, test=test) for each, test in zip(loops, tests, strict=True)]
 
     plain, wide = (covariance(paper_model, [FitProblem(paper_model, stated(noise), ["mu"])]) for noise in (0.01, None))
-    told = np.array([float(np.sum(np.square(loop.jacobian(paper_model, ["mu"])))) for loop in loops])
+    told = np.array([float(np.sum(np.square(jacobian(paper_model, [loop], ["mu"])))) for loop in loops])
+    told /= paper_model.values["mu"] ** 2
     share, freedom = told / told.sum(), np.array([loop.residual_count for loop in loops])
     assert plain.matrix[0, 0] == pytest.approx(1.0 / told.sum(), rel=1e-6)
     grown = wide.matrix[0, 0] / plain.matrix[0, 0] - 1.0

@@ -8,6 +8,7 @@ import pytest
 
 from bushfit.campaign.schema import RigSettings
 from bushfit.effects.contract import Array
+from bushfit.fitting.coordinates import Coordinates
 from bushfit.fitting.loop_cycles import steady_cycles
 from bushfit.fitting.loop_harmonics import MOST_ROWS
 from bushfit.fitting.noise import SweepNoise
@@ -18,6 +19,7 @@ from bushfit.geometry import Direction
 from bushfit.model.model import FIVE, Model
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.simulation import rig
+from tests.fits import jacobian
 
 RANDOM, SHARED = (5e-3, 7e-3), (4e-3, 3.5e-3)
 BLOCKS = {(1e-4, 1): 16, (1e-4, 2): 9, (5e-4, 1): 16}
@@ -99,7 +101,8 @@ def test_the_jacobian_is_that_of_the_residual(rig, sweep, paper_model, kind):
     else:
         data_set = replace(sweep, residuals=kind)  # type: ignore[arg-type]
     wrong = paper_model.with_values({"mu": 1.3e6, "alpha": 0.3, "sigma_fmax": 1e4, "eps_half": 3e-3})
-    for name, found in zip(FIVE, data_set.jacobian(wrong, FIVE), strict=True):
+    slopes = jacobian(wrong, [data_set], FIVE) / Coordinates.of_parameters(wrong, FIVE).slopes(wrong.values)[:, None]
+    for name, found in zip(FIVE, slopes, strict=True):
         value = wrong.values[name]
         steps = [wrong.with_values({name: value * (1.0 + k * 1e-3)}) for k in (-2, -1, 1, 2)]
         far, low, high, end = map(data_set.residual, steps)

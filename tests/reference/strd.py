@@ -119,9 +119,10 @@ class CurveTerm:
     def residual(self, curve: Curve) -> Array:
         return (self.problem.of(curve.values) - self.problem.response) / self.noise
 
-    def jacobian(self, curve: Curve, names: Sequence[str]) -> Array:
-        """By complex steps, which lose no digits."""
-        return np.stack([self._slope(curve.values, name) for name in names]) / self.noise
+    def recall(self, _: str, curve: Curve, names: Sequence[str]) -> Array:
+        """Residuals, then derivatives by complex steps, which lose no digits."""
+        slopes = [self._slope(curve.values, name) / self.noise for name in names]
+        return np.stack([self.residual(curve), *slopes])
 
     def _slope(self, values: Mapping[str, float], name: str) -> Array:
         step = 1e-20 * abs(values[name]) or 1e-20
