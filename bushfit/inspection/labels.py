@@ -9,7 +9,7 @@ import numpy as np
 
 from bushfit.geometry import Place
 from bushfit.reading.headers import ZERO_TO_PEAK, AmplitudeConvention
-from bushfit.reading.levels import find_levels, read_condition
+from bushfit.reading.levels import read_condition
 from bushfit.reading.names import Labels, StatedQuantity, labels_in_names
 from bushfit.reading.si_columns import columns_key
 from bushfit.reading.stiffness import hint_for_convertible_columns
@@ -28,7 +28,7 @@ _AGREEMENT = 0.03
 def count_temperatures(table: Table) -> int:
     """Number of temperatures in the columns of a table: 0 without such a column."""
     condition = read_condition(table, "temperature", table.motion)
-    return len(find_levels(table, condition, np.arange(condition.values.size))) if condition else 0
+    return len(condition.levels(np.arange(condition.values.size))) if condition else 0
 
 
 def labels_of_file(file: Path, sheet: str, test_options: Mapping[str, Any]) -> Labels:

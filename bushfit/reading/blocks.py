@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from bushfit import units
 from bushfit.reading.headers import COUNTED, Vocabulary
-from bushfit.reading.layout import Layout, Line, is_comment, is_row, is_summary_row, is_units_row
+from bushfit.reading.layout import WITH_UNIT, Layout, Line, is_comment, is_row, is_summary_row, is_units_row
 from bushfit.reading.names import NO_LABELS, Labels, labels_above, labels_in_names, named_direction
 from bushfit.reading.numerals import is_like_number, plainest_value
 from bushfit.reading.source import Channels, RowSource, Sheet, Text, cells_of
@@ -22,10 +22,6 @@ _NUMERIC = b"0123456789.,+-eEdD \t\r\n"
 #: Complex number: "1500+150i", "(1500 + 150j)".
 _COMPLEX = re.compile(
     r"\(?\s*([+-]?[\d.,]+(?:[eEdD][+-]?\d+)?)\s*([+-]\s*[\d.,]+(?:[eEdD][+-]?\d+)?)\s*\*?\s*[ij]\s*\)?"
-)
-#: Number with a unit: "594.4 N/mm", "±0,5mm", "5.7°". Possessive: an exponent belongs to the number, never to the unit.
-_WITH_UNIT = re.compile(
-    r"(?:±|\+/?-)?\s*(?P<number>[+-]?[\d.,]++(?:\s*+[eEdD][+-]?\d++)?+)\s*+(?P<unit>(?:[^\W\d]|[°%‰])[^;]{0,20})"
 )
 #: First rows that are searched for complex numbers and units; chosen: room for remarks.
 _FIRST = 8
@@ -294,7 +290,7 @@ def _complex_parts(text: str) -> list[str | float]:
 
 def _common_unit(texts: Sequence[str]) -> str:
     """Unit behind the number in each of several cells, such as "mm" of "0.5 mm"; "" without such a unit."""
-    found = list(dict.fromkeys(match["unit"] if (match := _WITH_UNIT.fullmatch(text)) else "?" for text in texts))
+    found = list(dict.fromkeys(match["unit"] if (match := WITH_UNIT.fullmatch(text)) else "?" for text in texts))
     is_temperature = bool(found) and all(map(units.kelvin_scale, found)) and len(found) == 1
     is_unit = bool(found) and all(units.is_compatible(unit, found[0]) for unit in found)
     return found[0] if is_temperature or is_unit else ""
@@ -302,7 +298,7 @@ def _common_unit(texts: Sequence[str]) -> str:
 
 def _in_unit(text: str, unit: str) -> str | float:
     """Number of a cell such as "500 um" in a unit; the text itself if it states no compatible unit."""
-    match = _WITH_UNIT.fullmatch(text)
+    match = WITH_UNIT.fullmatch(text)
     if match and match["unit"] == unit:
         return match["number"]
     if match is None or not units.is_compatible(match["unit"], unit):

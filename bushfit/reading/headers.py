@@ -105,8 +105,8 @@ _MEANS = re.compile(
 )
 #: Footnote marks in a name.
 _FOOTNOTES = str.maketrans("", "", "\u00b9\u00b2\u00b3\u2070\u2074\u2075\u2076\u2077\u2078\u2079\u2020\u2021")
-#: Units with which the symbol f cannot mean a role, by role.
-_UNITS_NOT_F = {"force": ("Hz",), "frequency": ("N", "N m")}
+#: Units with which the symbol f cannot mean a role, by name and role.
+_UNITS_NOT_F = {("f", "force"): ("Hz",), ("famplitude", "force_amplitude"): ("Hz",), ("f", "frequency"): ("N", "N m")}
 #: Units with which a short or ambiguous name means a role, by name and role.
 _UNITS_OF = {
     (name, role): si
@@ -115,8 +115,8 @@ _UNITS_OF = {
 }
 #: Names of an amplitude that imply peak-to-peak.
 PEAK_TO_PEAK_NAMES = frozenset(WORDS["counting"]["peak_to_peak"])
-#: Parts of the patterns of conventions: ends of words, and the end of a unit to which one may be joined ("mmpp").
-_PARTS = {part: "|".join(WORDS["conventions"][part]) for part in ("start", "end", "unit", "peak")}
+#: Parts of the patterns of conventions: ends of words, and the end of a symbol ("Fmax") or unit ("mmpp") before them.
+_PARTS = {part: "|".join(WORDS["conventions"][part]) for part in ("start", "symbol", "end", "unit", "peak")}
 #: Key in words.toml of the words for each convention, in the order in which they are tried.
 _CONVENTION_KEYS: dict[str, AmplitudeConvention] = {
     "zero_to_peak": "zero-to-peak", "peak_to_peak": "peak-to-peak", "rms": "rms", "lone_peak": "zero-to-peak"
@@ -260,7 +260,7 @@ class Vocabulary:
             bare, without_asides = plain(name), plain(_ASIDES.sub("", _folded(name)))
             implied: AmplitudeConvention | None = "peak-to-peak" if bare in PEAK_TO_PEAK_NAMES else convention
             amplitudes = [word + "amplitude" for word in (bare, without_asides) if implied or (extreme and word)]
-            amplitudes += ["amplitude"] * (bare in PEAK_TO_PEAK_NAMES)
+            amplitudes += ["amplitude"] * (bare in PEAK_TO_PEAK_NAMES) + [f"{bare}extreme"] * is_extreme
             without_mean = plain(_MEANS.sub("", _folded(name)))
             for word in (
                 bare,
@@ -309,7 +309,7 @@ def fits(word: str, role: str, unit: str | None) -> bool:
         return bool(units.kelvin_scale(unit))  # else a time, or another quantity
     if unit and (expected := _UNITS_OF.get((word, role))):
         return any(units.is_compatible(unit, si) for si in expected)
-    return not (word == "f" and unit and any(units.is_compatible(unit, si) for si in _UNITS_NOT_F.get(role, ())))
+    return not any(units.is_compatible(unit or "", si) for si in _UNITS_NOT_F.get((word, role), ()))
 
 
 def is_angular(header: str, unit: str) -> bool:

@@ -48,6 +48,12 @@ _COMMENT_SIGNS = ("#", "%", "//")
 _NUMBERED = re.compile(r"#\s?\d+\b")
 #: Blanks between a name and the bracket of its unit, which do not separate columns.
 _BLANK_BEFORE_BRACKET = re.compile(r" {1,8}(?=[\[(])")
+#: Blanks between columns of cells with units, such as "5 Hz 0.1 mm": not behind a number without its unit.
+_BETWEEN_QUANTITIES = re.compile(r"(?<=[^\d\s])\s+|\s+(?=[+-]?\.?\d)")
+#: Number with a unit: "594.4 N/mm", "±0,5mm", "5.7°". Possessive: an exponent belongs to the number, never to the unit.
+WITH_UNIT = re.compile(
+    r"(?:±|\+/?-)?\s*(?P<number>[+-]?[\d.,]++(?:\s*+[eEdD][+-]?\d++)?+)\s*+(?P<unit>(?:[^\W\d]|[°%‰])[^;]{0,20})"
+)
 #: Wide gap, which is shortened to two blanks.
 _WIDE_GAP = re.compile(" {3,}")
 #: Gap between columns whose headers contain single blanks.
@@ -148,7 +154,11 @@ def split(content: Content, delimiter: str) -> list[str]:
     if len(text) > _LONGEST_LINE:
         raise csv.Error(f"a line of {len(text)} characters")
     if delimiter == " ":
-        return text.split()
+        cells, quantities = text.split(), _BETWEEN_QUANTITIES.split(text.strip())
+        if len(quantities) < len(cells) and len(quantities) > 1:
+            found = [match["unit"] for match in map(WITH_UNIT.fullmatch, quantities) if match]
+            return quantities if len(found) > 1 and all(map(units.is_unit, found)) else cells
+        return cells
     if '"' in text:
         return [cell.strip() for cell in next(csv.reader([text], delimiter=delimiter, skipinitialspace=True), ())]
     return [cell.strip() for cell in text.split(delimiter, _MOST_COLUMNS)]

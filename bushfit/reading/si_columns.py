@@ -128,7 +128,11 @@ def columns_key(table: Table, role: str, unit: str) -> str:
         header
         for header, in_row in zip(table.headers, table.layout.units, strict=True)
         if header
-        and (not (heading := usual.heading(header)) or (role, heading.role) == ("amplitude", "displacement"))
+        and (
+            not (heading := usual.heading(header))
+            or heading.role == role
+            or (role, heading.role) == ("amplitude", "displacement")
+        )
         and unit != "1"
         and units.is_compatible(split_unit(header)[1] or parse_unit(in_row)[0], unit)
     ]

@@ -14,7 +14,7 @@ from bushfit.geometry import Place, strain_factor_of_files
 from bushfit.reading.finding import find_table
 from bushfit.reading.headers import SWEEP_COLUMNS, ZERO_TO_PEAK, AmplitudeConvention, Column
 from bushfit.reading.labelled import Rows, column_texts, note_not_understood
-from bushfit.reading.levels import find_levels, read_condition
+from bushfit.reading.levels import read_condition
 from bushfit.reading.measurement import Floats, Sweep
 from bushfit.reading.parts import OpenedFile
 from bushfit.reading.preload import parse_preload
@@ -99,8 +99,9 @@ def read_sweep(
         stiffness, loss_factor = complex_stiffness(pair, values)
     check_stiffness(table, pair, columns, values, stiffness, loss_factor)
     frequency = values["frequency"]
-    selected, degrees = _rows_of_test(table, "temperature", np.arange(frequency.size), direction, test)
-    selected, _ = _rows_of_test(table, "preload", selected, direction, test)
+    points = (frequency, values["amplitude"])
+    selected, degrees = _rows_of_test(table, "temperature", np.arange(frequency.size), points, direction, test)
+    selected, _ = _rows_of_test(table, "preload", selected, points, direction, test)
     kelvin = test.temperature if degrees is None else degrees[selected] + si.CELSIUS
     temperature = test.temperature
     if degrees is not None and temperature is None:
@@ -188,7 +189,7 @@ def sweep_columns(
 
 
 def _rows_of_test(
-    table: Table, role: str, rows: NDArray[np.intp], place: Place, test: SweepFile
+    table: Table, role: str, rows: NDArray[np.intp], points: tuple[Floats, Floats], place: Place, test: SweepFile
 ) -> tuple[NDArray[np.intp], Floats | None]:
     """Select the rows of a sweep at the temperature or preload of the test.
 
@@ -196,6 +197,7 @@ def _rows_of_test(
         table: table of the sweep.
         role: "temperature" or "preload".
         rows: indices of the rows to select from, (n,).
+        points: frequency and amplitude of all rows.
         place: direction of the bushing, or the specimen.
         test: table [[sweeps]] of the campaign.
 
@@ -210,7 +212,7 @@ def _rows_of_test(
     condition = read_condition(table, role, place.motion)
     if condition is None:
         return rows, None
-    levels, stated, tolerance = find_levels(table, condition, rows), None, condition.step
+    levels, stated, tolerance = condition.levels(rows, points), None, condition.step
     if role == "temperature" and test.temperature is not None:
         stated = test.temperature - si.CELSIUS
     elif role == "preload" and len(levels) > 1 and (preload := parse_preload(test.preload, place)):

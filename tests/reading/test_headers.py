@@ -27,7 +27,8 @@ PEAK_TO_PEAK = [
     "Double amplitude (mm)", "DispPkPk [mm]", "Ampl. DA (mm)", "Xpp [mm]",
 ]  # fmt: skip
 ZERO_TO_PEAK = [
-    "Amplitude 0-p [mm]", "Amplitude zero-to-peak (mm)", "Amplitude crête [mm]", "Amplitude (valeur de crête) [mm]",
+    "Amplitude 0-p [mm]", "Weg 0-s [mm]", "Amplitude 0-S [mm]", "Amplitude (0-P) [mm]", "Amplitude (0-pk) [mm]",
+    "Amplitude zero-to-peak (mm)", "Amplitude crête [mm]", "Amplitude (valeur de crête) [mm]",
     "Amplitude Spitze [mm]", "Amplitude Scheitelwert / mm", "Scheitelwert der Amplitude [mm]", "peak amplitude [mm]",
     "Displacement peak (mm)", "Amp_pk_mm", "Ampiezza di picco [mm]", "Amplitud de pico [mm]",
     "Amplituda szczytowa [mm]",
