@@ -52,12 +52,14 @@ class FaultyPart(Explanation):
         may_be_physics: True if an effect that the model lacks could change the same points, and not a wrong test: the
             smallest or largest level of a direction, a loop that no other test covers, or frequencies in all directions
             at every amplitude.
+        is_scattered: True if each point has an independent error; False for a common shift or slope.
     """
 
     direction: Place
     frequency: tuple[float, float]
     amplitude: tuple[float, float]
     may_be_physics: bool = field(default=False, kw_only=True)
+    is_scattered: bool = field(default=False, kw_only=True)
 
     @property
     def columns(self) -> Array:
@@ -75,7 +77,7 @@ class FaultyPart(Explanation):
         rows = np.flatnonzero(size)
         columns = np.zeros((rows.size, size.size))
         columns[np.arange(rows.size), rows] = size[rows]
-        return replace(self, group=Group(columns, np.eye(rows.size), act_together=True))
+        return replace(self, group=Group(columns, np.eye(rows.size), act_together=True), is_scattered=True)
 
     def region(self, residual: Array, change: float) -> MisfitRegion:
         """Region of disagreement that this faulty part is.

@@ -16,8 +16,7 @@ from bushfit.diagnosis.linear_model import GroupEvidence, LinearModel
 from bushfit.diagnosis.priors import LEVELS
 from bushfit.diagnosis.projected_columns import CompoundDeviation, GroupSet
 from bushfit.diagnosis.propose import Proposal, proposals
-from bushfit.diagnosis.recorded_tests import RecordedTests
-from bushfit.diagnosis.rig_errors import in_scatter_units
+from bushfit.diagnosis.recorded_tests import ExplanationColumns, RecordedTests
 from bushfit.diagnosis.smooth_deviations import COMPOUND, compound, fast_relaxation
 from bushfit.effects import get_effect, get_parameter, qualified_name
 from bushfit.effects.contract import Array
@@ -153,7 +152,7 @@ class SearchState:
     @cached_property
     def bare(self) -> FitResult:
         """The fit with residuals in units of the scatter from point to point, without errors that points share."""
-        return self.tests.bare if self.fit is self.tests.base else in_scatter_units(self.fit)
+        return self.fit.reevaluate(self.fit.model, self.tests.bare.data_sets)
 
     @cached_property
     def plain(self) -> FitResult:
@@ -177,12 +176,19 @@ class SearchState:
     @cached_property
     def linear(self) -> LinearModel:
         """Residuals linearised at the fit, from which the evidence is computed for each noise case of the rig."""
-        tests, bare, moves = self.tests, self.bare, self.has_influence
+        bare, moves, columns = self.bare, self.has_influence, self.columns
         precision = np.array([self.precision.get(name, 0.0) for name in bare.names])
-        of_faulty_parts = [np.full(len(p.columns), x**-2) for p, x in zip(self.faulty_parts, self.amounts, strict=True)]
-        rows = np.concatenate([bare.jacobian[moves], *(part.columns for part in self.faulty_parts)])
-        precision = np.concatenate([precision[moves], *of_faulty_parts])
-        return LinearModel(bare.residual, rows, precision, tests.errors, compound=tests.compound)
+        common = [(p, x) for p, x in zip(self.faulty_parts, self.amounts, strict=True) if not p.is_scattered]
+        rows = np.concatenate([bare.jacobian[moves], *(part.columns for part, _ in common)])
+        precision = np.concatenate([precision[moves], *(np.full(len(part.columns), x**-2) for part, x in common)])
+        return LinearModel(bare.residual, rows, precision, columns.errors, columns.compound)
+
+    @cached_property
+    def columns(self) -> ExplanationColumns:
+        """Further explanations beside the errors of the rig and of faulty parts whose points deviate independently."""
+        pairs = zip(self.faulty_parts, self.amounts, strict=True)
+        variances = [x**2 * np.square(part.columns).sum(axis=0) for part, x in pairs if part.is_scattered]
+        return self.tests.columns.with_variance(np.sum(variances, axis=0)) if variances else self.tests.columns
 
     @property
     def log_posterior(self) -> float:
@@ -226,7 +232,7 @@ class SearchState:
         columns = []
         for part, amount in zip(self.faulty_parts, self.amounts, strict=True):
             fitted = self.tests.faulty_parts_in_fits[part.name]
-            fitted = fitted if len(fitted.columns) == len(part.columns) else fitted.point_by_point()
+            fitted = fitted.point_by_point() if part.is_scattered else fitted
             columns.append(amount * fitted.columns)
         compound = self.tests.compound_in_fits if deviation else None
         columns += [deviation * compound.whole] if compound else []
@@ -240,12 +246,12 @@ class SearchState:
         """
         bare, values = self.bare, self.bare.model.values
         group = compound(bare, MAXIMUM_NODES)
-        deviation = CompoundDeviation(group, self.tests.errors) if group else None
-        linear = replace(self.linear, compound=deviation, chosen_cases=self._likely_cases)
+        deviation = CompoundDeviation(group, self.columns.errors) if group else None
+        linear = replace(self.linear, compound=deviation)
         moves = self.has_influence
         slopes, count = bare.coordinates.slopes(values)[moves], np.count_nonzero(moves)
         names = tuple(np.array(bare.names)[moves].tolist())
-        mean, covariance = linear.parameters(fast_relaxation(bare))
+        mean, covariance = linear.parameters(self._likely_cases, fast_relaxation(bare))
         steps = dict(zip(names, slopes * mean[:count], strict=True))
         means = {name: float(np.clip(values[name] + x, *get_parameter(name).bounds)) for name, x in steps.items()}
         fitted = Covariance(names, covariance[:count, :count] * np.outer(slopes, slopes))
@@ -264,10 +270,10 @@ class SearchState:
     @cached_property
     def explanation_evidence(self) -> list[tuple[Explanation, GroupEvidence]]:
         """Further explanations of the gap, each with the evidence of the tests for it in the linearised model."""
-        tests, effects = self.tests, [e for e in self.proposals if e.group] if self.may_grow else []
-        sets = GroupSet.split([e.group for e in effects if e.group], tests.errors)
-        evidence = self.weigh([*sets, *tests.explanation_sets])
-        return list(zip([*effects, *tests.explanations], evidence, strict=True))
+        columns, effects = self.columns, [e for e in self.proposals if e.group] if self.may_grow else []
+        sets = GroupSet.split([e.group for e in effects if e.group], columns.errors)
+        evidence = self.weigh([*sets, *columns.sets])
+        return list(zip([*effects, *columns.explanations], evidence, strict=True))
 
     def weigh(self, sets: Sequence[GroupSet]) -> list[GroupEvidence]:
         """Evidence of the tests for sets of explanations, averaged over the likely sizes of the rig's errors.
@@ -275,13 +281,12 @@ class SearchState:
         Returns:
             One evidence per explanation, in the same order.
         """
-        return replace(self.linear, chosen_cases=self._likely_cases).group_evidence_of(sets)
+        return self.linear.group_evidence(sets, self._likely_cases)
 
     @cached_property
     def _likely_cases(self) -> Array:
         """Indices of the noise cases (sizes of rig errors) that are likely, alone or together with a smooth curve."""
-        curves = replace(self.linear, groups=self.tests.curves, compound=None)
-        return np.union1d(self.linear.likely_cases(_NEAR), curves.likely_cases(_NEAR))
+        return self.linear.likely_cases(self.columns.curves, _NEAR)
 
     def extended(
         self, evidence: GroupEvidence, last: Explanation | None = None, log_odds: float = 0.0

@@ -14,16 +14,16 @@ Notes:
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.special import chdtrc, log_ndtr
+from scipy.special import chdtrc, log_ndtr, logsumexp, softmax
 
 from bushfit.diagnosis.explanations import Group
 from bushfit.diagnosis.priors import SIZES
-from bushfit.diagnosis.projected_columns import CompoundDeviation, GroupSet, RigRows
+from bushfit.diagnosis.projected_columns import Batch, CompoundDeviation, GroupSet, RigRows
 from bushfit.diagnosis.rig_errors import RigErrors
 from bushfit.effects.contract import Array
 
@@ -31,6 +31,8 @@ from bushfit.effects.contract import Array
 _ROUNDING = 1e-9
 #: Posterior weight of a noise case below which it changes no mean: rounding.
 _NEGLIGIBLE = 1e-15
+#: Largest prior size of an amount over a standard deviation that is nearly flat; it changes the amount by a permille.
+_SMALL = 0.03
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,30 +61,52 @@ class GroupEvidence:
         return float(np.logaddexp(self.log_evidence, self.with_compound.log_evidence))
 
 
-#: Largest prior size of an amount over a standard deviation that is nearly flat; it changes the amount by a permille.
-_SMALL = 0.03
-
-
 @dataclass(frozen=True, eq=False)
-class Products:
-    """Evidence without a further explanation, and inner products with P, in each noise case.
+class Projection:
+    """Residuals with the parameters and the compound's deviation projected out, in each of c noise cases.
 
-    P projects out the parameters and the compound's deviation, and whitens by the rig's errors. A block is a set of
-    columns that act together; blocks are collected by their number of columns (width) for array operations.
+    The projection is P, see the notes of the module.
 
     Args:
-        base: natural log of the prior weight of the case times the evidence without a further explanation, (cases,).
-        misfit: r^T P r of the residuals r, (cases,).
-        deviation: posterior mean of the amounts of the q modes of the compound's deviation, (cases, q).
-        projections: U^T P r of the blocks U, an array (cases, blocks, width) for each width.
-        grams: U^T P U of the blocks U, an array (cases, blocks, width, width) for each width.
+        rows: residual, then the derivatives with respect to the k parameters, (1 + k, n).
+        compound: deviation of the compound, with q modes.
+        cases: indices of the noise cases, (c,).
+        base: natural log of the prior weight of the case times the evidence without a further explanation, (c,).
+        misfit: r^T P r of the residuals r, (c,).
+        deviation: posterior mean of the amounts of the q modes of the compound's deviation, (c, q).
+        modes: inner products of the modes with the rows, (c, q, 1 + k), and the shrinkage of these products, (c, q).
+        root: Cholesky factor of the scaled information on the parameters, (c, k, k), and the scale, (k,).
+        free: components of the residual along the parameters, (c, k).
     """
 
+    rows: RigRows
+    compound: CompoundDeviation
+    cases: Array
     base: Array
     misfit: Array
     deviation: Array
-    projections: list[Array]
-    grams: list[Array]
+    modes: tuple[Array, Array]
+    root: tuple[Array, Array]
+    free: Array
+
+    def products(self, groups: GroupSet) -> Iterator[tuple[Batch, Array, Array]]:
+        """Inner products of the blocks U of each batch of groups.
+
+        Yields:
+            The batch; U^T P r with the residuals r, (c, blocks, width); and U^T P U, (c, blocks, width, width).
+        """
+        used, index = np.unique(self.rows.rig.combinations[1][self.cases], return_inverse=True)
+        (modes, shrinkage), (root, scale) = self.modes, self.root
+        smooth = groups.with_modes(self.compound, used)[index]
+        products = self.rows.inner(groups.rows, used)[index]
+        products -= (modes * shrinkage[..., None]).swapaxes(1, 2) @ smooth
+        free = np.linalg.solve(root, products[:, 1:] / scale[:, None])
+        projections = products[:, 0] - np.einsum("ck,ckg->cg", self.free, free)
+        for batch, within in zip(groups.batches, groups.within(used), strict=True):
+            absorbed = np.moveaxis(free[..., batch.columns], 1, -1)  # (c, blocks, width, k)
+            shrunk = np.moveaxis(smooth[..., batch.columns], 1, -1)
+            gram = within[index] - (shrunk * shrinkage[:, None, None]) @ shrunk.swapaxes(-1, -2)
+            yield batch, projections[:, batch.columns], gram - absorbed @ absorbed.swapaxes(-1, -2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,8 +123,6 @@ class LinearModel:
         precision: prior precision of each row of the Jacobian, 0 for a flat prior, (k,).
         rig: errors of the rig. Each of its noise cases assumes a size of these errors and of the compound's deviation
             from the model's laws.
-        groups: candidate explanations; None without any.
-        chosen_cases: indices of the noise cases to average over; None for all cases.
         compound: deviation of the compound, part of every hypothesis; None without a deviation.
     """
 
@@ -108,117 +130,76 @@ class LinearModel:
     jacobian: Array
     precision: Array
     rig: RigErrors
-    groups: GroupSet | None = None
-    chosen_cases: Array | None = None
     compound: CompoundDeviation | None = None
 
     @cached_property
+    def rows(self) -> RigRows:
+        """Residual, then the rows of the Jacobian, (1 + k, n), with their inner products."""
+        return RigRows(np.concatenate([self.residual[None], self.jacobian]), self.rig)
+
+    @cached_property
     def cases(self) -> Array:
-        """Indices of the noise cases to average over; without `compound`, only cases without a deviation."""
-        chosen = np.arange(len(self.rig.cases)) if self.chosen_cases is None else self.chosen_cases
-        return np.array([n for n in chosen.tolist() if self.compound or not self.rig.cases[n].compound], dtype=int)
+        """Indices of all noise cases; without `compound`, only of those without a deviation."""
+        return np.flatnonzero((self.rig.deviation == 0.0) | (self.compound is not None))
 
-    @cached_property
-    def deviations(self) -> Array:
-        """Standard deviation of the compound's deviation from the model in each case, relative to |K|, (cases,)."""
-        return np.array([self.rig.cases[n].compound for n in self.cases])
-
-    @cached_property
-    def combinations(self) -> Array:
-        """Index of the combination of sizes of the rig's errors in each case, (cases,)."""
-        return self.rig.combinations[1][self.cases]
-
-    @cached_property
-    def products(self) -> Products:
-        """Evidence without a further explanation, and inner products, in each noise case."""
-        rig, groups, has_prior = self.rig, self.groups, self.precision > 0.0
-        first = RigRows(np.concatenate([self.residual[None], self.jacobian]), rig)
-        none = Group(np.zeros((0, self.residual.size)), np.zeros((0, 1)), act_together=True)
-        compound = self.compound or CompoundDeviation(none, rig)
-        used, index = np.unique(self.combinations, return_inverse=True)
-        gram, modes = first.inner(first, used), compound.inner(first, used)
-        if groups:
-            gram = np.concatenate((gram, first.inner(groups.rows, used)), axis=-1)
-            modes = np.concatenate((modes, groups.with_modes(compound, used)), axis=-1)
-        flat, modes = slice(1, len(first.rows)), modes[index]
-        variance = np.square(self.deviations)[:, None]
-        grown = 1.0 + variance * compound.modes[0][self.combinations]
-        shrinkage = variance / grown  # of the products with each mode
-        gram = gram[index] - (modes[..., : flat.stop] * shrinkage[..., None]).swapaxes(1, 2) @ modes
-        scale, information = _scale_information(gram[:, flat, flat], self.jacobian, self.precision)
-        root, others = np.linalg.cholesky(information), np.delete(gram, flat, axis=-1)  # of the residuals and groups
-        free = np.linalg.solve(root, others[:, flat] / scale[:, None])
-        residual = others[:, 0] - np.einsum("nk,nkc->nc", free[..., 0], free)
-        parameters = np.linalg.solve(information, others[:, flat, :1] / scale[:, None])[..., 0] / scale
-        deviation = shrinkage * (modes[..., 0] - np.einsum("nqk,nk->nq", modes[..., flat], parameters))
-        log_det = rig.roots[1][self.combinations] + np.sum(np.log(grown), axis=1)
-        log_det += 2.0 * np.sum(np.log(np.einsum("nkk->nk", root) * scale), axis=1)
-        log_det -= np.sum(np.log(self.precision[has_prior]))
-        projections, projected = [], []
-        for (_, columns), products in zip(groups.blocks, groups.within(used), strict=True) if groups else ():
-            absorbed = np.moveaxis(free[..., 1 + columns], 1, -1)  # (cases, blocks, width, k)
-            smooth = np.moveaxis(modes[..., flat.stop + columns], 1, -1)
-            products = products[index] - (smooth * shrinkage[:, None, None]) @ smooth.swapaxes(-1, -2)
-            projected.append(products - absorbed @ absorbed.swapaxes(-1, -2))
-            projections.append(residual[:, 1 + columns])
-        base = np.array([rig.cases[n].log_weight for n in self.cases]) - 0.5 * (residual[:, 0] + log_det)
-        return Products(base, residual[:, 0], deviation, projections, projected)
-
-    @cached_property
-    def _is_plain(self) -> Array:
-        """Mask of the noise cases with rig errors within the stated accuracy and without compound deviation."""
-        return np.array([not self.rig.cases[n].wide for n in self.cases]) & (self.deviations == 0.0)
-
-    @cached_property
-    def _gains(self) -> list[tuple[Array, Array]]:
-        """Gain in log evidence and squared relative change of |K| of each group, for each prior size of its amounts.
-
-        Returns:
-            For each group, gain and squared change, (cases, blocks, sizes) each; a block is a set of columns that act
-            together.
-        """
-        groups, blocks = (self.groups.groups, self.groups.blocks) if self.groups else ((), [])
-        gains: list[list[tuple[Array, Array]]] = [[] for _ in groups]
-        products = self.products
-        for (numbers, _), projections, gram in zip(blocks, products.projections, products.grams, strict=True):
-            units = [groups[number].unit if groups[number].act_together else np.eye(1) for number in numbers]
-            senses = np.array([groups[number].sign for number in numbers])
-            for number, gain, changes in zip(numbers, *_block_gains(gram, projections, units, senses), strict=True):
-                gains[number].append((gain, changes))
-        stacked = (zip(*blocks, strict=True) for blocks in gains)
-        return [(np.stack(gain, axis=1), np.stack(changes, axis=1)) for gain, changes in stacked]
-
-    @cached_property
-    def group_evidence(self) -> list[GroupEvidence]:
-        """Evidence of the tests for each explanation in `groups`, with rig errors within the stated accuracy."""
-        deviates = self.deviations > 0.0
-        return [
-            self._over_cases(gains, self._is_plain, self._over_cases(gains, deviates) if deviates.any() else None)
-            for gains in self._gains
-        ]
-
-    def _over_cases(
-        self, gains: tuple[Array, Array], chosen: Array, with_compound: GroupEvidence | None = None
-    ) -> GroupEvidence:
-        """Average the evidence for one explanation over some noise cases.
+    def project(self, cases: Array) -> Projection:
+        """Project the parameters and the compound's deviation out of the residuals.
 
         Args:
-            gains: gain in log evidence, and squared relative change of |K|, (cases, blocks, sizes) each, see `_gains`.
-            chosen: mask of the noise cases, (cases,).
-            with_compound: evidence together with a compound deviation, copied to the result; None without it.
+            cases: indices of c noise cases, (c,).
         """
-        log_evidence = (self.products.base[:, None, None] + gains[0])[chosen]
-        if not log_evidence.size:
-            return GroupEvidence(-np.inf, 0.0, float(SIZES[0]), with_compound)
-        total = _log_sum(log_evidence)
-        share = np.exp(log_evidence - total)
-        size = float(np.sqrt(np.sum(share * gains[1][chosen])))
-        likeliest = float(SIZES[int(np.argmax(share.sum(axis=(0, 1))))])
-        return GroupEvidence(total - float(np.log(log_evidence[0].size)), size, likeliest, with_compound)
+        rig, rows, deviates = self.rig, self.rows, bool(self.rig.deviation[cases].any())
+        none = Group(np.zeros((0, self.residual.size)), np.zeros((0, 1)), act_together=True)
+        compound = self.compound if self.compound and deviates else CompoundDeviation(none, rig)
+        combinations = rig.combinations[1][cases]
+        used, index = np.unique(combinations, return_inverse=True)
+        modes = compound.inner(rows, used)[index]
+        variance = np.square(rig.deviation[cases])[:, None]
+        grown = 1.0 + variance * compound.modes[0][combinations]
+        shrinkage = variance / grown  # of the products with each mode
+        gram = rows.inner(rows, used)[index] - (modes * shrinkage[..., None]).swapaxes(1, 2) @ modes
+        scale, information = _scale_information(gram[:, 1:, 1:], self.jacobian, self.precision)
+        root = np.linalg.cholesky(information)
+        free = np.linalg.solve(root, gram[:, 1:, :1] / scale[:, None])
+        misfit = gram[:, 0, 0] - np.sum(np.square(free[..., 0]), axis=1)
+        parameters = np.linalg.solve(root.swapaxes(1, 2), free) / scale[:, None]
+        deviation = shrinkage * (modes[..., 0] - (modes[..., 1:] @ parameters)[..., 0])
+        log_det = rig.roots[1][combinations] + np.sum(np.log(grown), axis=1)
+        log_det += 2.0 * np.sum(np.log(np.einsum("ckk->ck", root) * scale), axis=1)
+        log_det -= np.sum(np.log(self.precision[self.precision > 0.0]))
+        base = rig.log_weight[cases] - 0.5 * (misfit + log_det)
+        shrunk, factor = (modes, shrinkage), (root, scale)
+        return Projection(rows, compound, cases, base, misfit, deviation, shrunk, factor, free[..., 0])
 
-    def group_evidence_of(self, sets: Sequence[GroupSet]) -> list[GroupEvidence]:
-        """Evidence of the tests for the explanations in several sets, in the same order."""
-        return [evidence for groups in sets for evidence in replace(self, groups=groups).group_evidence]
+    @cached_property
+    def over_cases(self) -> tuple[Array, Array, Array]:
+        """Fields `base`, `misfit` and `deviation` of `Projection` for all noise cases."""
+        projection = self.project(self.cases)
+        return projection.base, projection.misfit, projection.deviation
+
+    def group_evidence(self, sets: Sequence[GroupSet], cases: Array | None = None) -> list[GroupEvidence]:
+        """Evidence of the tests for each explanation in several sets, with rig errors within the stated accuracy.
+
+        Args:
+            sets: the explanations.
+            cases: indices of the noise cases to average over; None for all cases.
+        """
+        projection = self.project(self.cases if cases is None else cases)
+        plain, deviates = self.rig.is_plain[projection.cases], self.rig.deviation[projection.cases] > 0.0
+        evidence = list[GroupEvidence]()
+        for groups in sets:
+            by_group = dict[int, GroupEvidence]()
+            for batch, projections, gram in projection.products(groups):
+                gain, changes = _block_gains(batch, projections, gram)
+                log_evidence = projection.base[:, None, None] + gain
+                without, bent = (
+                    _average(batch.groups, log_evidence[mask], changes[mask]) for mask in (plain, deviates)
+                )
+                pairs = zip(without, bent if deviates.any() else [None] * len(without), strict=True)
+                numbers = np.unique(batch.groups).tolist()
+                by_group |= {n: replace(x, with_compound=y) for n, (x, y) in zip(numbers, pairs, strict=True)}
+            evidence += [by_group[number] for number in range(len(groups.groups))]
+        return evidence
 
     @cached_property
     def evidence(self) -> GroupEvidence:
@@ -226,41 +207,47 @@ class LinearModel:
 
         With a deviation of the compound, `size` and `likeliest` are those of the deviation, relative to |K|.
         """
-        base, deviates, with_compound = self.products.base, self.deviations > 0.0, None
-        if self.compound and deviates.any():
-            log_evidence, sizes = _log_sum(base[deviates]), self.deviations[deviates]
+        (base, _, amounts), deviation, with_compound = self.over_cases, self.rig.deviation[self.cases], None
+        if self.compound and (deviates := deviation > 0.0).any():
+            log_evidence, sizes = float(np.logaddexp.reduce(base[deviates])), deviation[deviates]
             share = np.exp(base[deviates] - log_evidence)
             likeliest = max(np.unique(sizes), key=lambda size: share[sizes == size].sum())
             likely = np.flatnonzero(share > _NEGLIGIBLE)
-            amounts, combinations = (x[deviates][likely] for x in (self.products.deviation, self.combinations))
-            size = float(np.sqrt(share[likely] @ self.compound.largest_changes(amounts, combinations)))
-            with_compound = GroupEvidence(log_evidence, size, float(likeliest))
-        return GroupEvidence(_log_sum(base[self._is_plain]), 0.0, 0.0, with_compound)
+            combinations = self.rig.combinations[1][self.cases][deviates]
+            changes = self.compound.largest_changes(amounts[deviates][likely], combinations[likely])
+            with_compound = GroupEvidence(log_evidence, float(np.sqrt(share[likely] @ changes)), float(likeliest))
+        plain = np.logaddexp.reduce(base[self.rig.is_plain[self.cases]])
+        return GroupEvidence(float(plain), 0.0, 0.0, with_compound)
 
     @property
     def log_evidence_with_level_errors(self) -> float:
         """Natural log of the evidence if only rig errors of levels, see `priors.LEVELS`, exceed the stated accuracy."""
-        return _log_sum(self.products.base[~self._is_plain & (self.deviations == 0.0)])
+        wide = ~self.rig.is_plain & (self.rig.deviation == 0.0)
+        return float(np.logaddexp.reduce(self.over_cases[0][wide[self.cases]]))
 
-    def likely_cases(self, far: float) -> Array:
+    def likely_cases(self, curves: GroupSet | None, far: float) -> Array:
         """Select the noise cases (assumed sizes of rig errors and of the compound's deviation) with a high evidence.
 
         Args:
+            curves: smooth curves, one of which may explain a gap; None without any.
             far: difference in log evidence from the best case beyond which a case is left out.
 
         Returns:
             Indices of the cases within `far` of the best case. A case without a deviation is also selected if a case
-            with the same rig errors and a deviation, or the case with one of `groups` added, is within `far` of the
-            best.
+            with the same rig errors and a deviation, or the case with one of the curves, is within `far` of the best.
         """
-        plain, index = self._is_plain, self.combinations
-        base = np.where(plain | (self.deviations > 0.0), self.products.base, -np.inf)
+        plain, index = self.rig.is_plain[self.cases], self.rig.combinations[1][self.cases]
+        base = np.where(plain | (self.rig.deviation[self.cases] > 0.0), self.over_cases[0], -np.inf)
         best = np.full(index.max() + 1, -np.inf)
         np.maximum.at(best, index, base)
         near = (base > base.max() - far) | (plain & (base > base[plain].max() - far))
-        with_group = np.max([base, *(self.products.base + gains.max(axis=(1, 2)) for gains, _ in self._gains)], axis=0)
-        led = (best[index] > best.max() - far) | (with_group > with_group[plain].max() - far)
-        return self.cases[near | (plain & led)]
+        near |= plain & (best[index] > best.max() - far)
+        if curves:
+            projection = self.project(self.cases[plain])
+            gains = [_posterior(gram, b)[0].max(axis=(1, 2)) for _, b, gram in projection.products(curves)]
+            with_curve = projection.base + np.max([np.zeros(len(projection.base)), *gains], axis=0)
+            near[plain] |= with_curve > with_curve.max() - far
+        return self.cases[near]
 
     def p_value(self, *, compound_deviates: bool = False) -> float:
         """Probability that tests of a complete model would have a larger misfit r^T P r than these tests.
@@ -271,14 +258,16 @@ class LinearModel:
         Notes: a posterior predictive check (Gelman, Meng and Stern, 1996), averaged over noise cases by probability. r
         are the whitened residuals, and P projects out the parameters.
         """
-        base = np.where(self.deviations > 0.0 if compound_deviates else self._is_plain, self.products.base, -np.inf)
+        chosen = self.rig.deviation > 0.0 if compound_deviates else self.rig.is_plain
+        base = np.where(chosen[self.cases], self.over_cases[0], -np.inf)
         freedom = max(self.residual.size - int(np.count_nonzero(self.precision == 0.0)), 1)
-        return float(np.exp(base - _log_sum(base)) @ chdtrc(freedom, self.products.misfit))
+        return float(np.exp(base - np.logaddexp.reduce(base)) @ chdtrc(freedom, self.over_cases[1]))
 
-    def parameters(self, relaxation: Array) -> tuple[Array, Array]:
-        """Posterior of the changes of the k rows of the Jacobian from the fit, averaged over the noise cases.
+    def parameters(self, cases: Array, relaxation: Array) -> tuple[Array, Array]:
+        """Posterior of the changes of the k rows of the Jacobian from the fit, averaged over noise cases.
 
         Args:
+            cases: indices of the noise cases.
             relaxation: change of the n residuals by a relaxation that is faster than the tests, (n,). A compound that
                 deviates may have one, of any size in `priors.SIZES`.
 
@@ -290,16 +279,18 @@ class LinearModel:
         """
         rows = np.concatenate((self.jacobian, relaxation[None]))
         groups = GroupSet((Group(rows, np.eye(len(rows)), act_together=True),), self.rig)
-        alone = replace(self, jacobian=self.jacobian[:0], precision=self.precision[:0], groups=groups).products
+        alone = replace(self, jacobian=self.jacobian[:0], precision=self.precision[:0]).project(cases)
+        ((_, projections, grams),) = alone.products(groups)
         wide = np.append(self.precision, np.square(_SMALL / SIZES[-1]))
-        scale, information = _scale_information(alone.grams[0][:, 0], rows, wide)
+        scale, information = _scale_information(grams[:, 0], rows, wide)
         covariance = np.linalg.inv(information) / np.outer(scale, scale)
-        shift = np.einsum("nij,nj->ni", covariance, alone.projections[0][:, 0])
+        shift = np.einsum("nij,nj->ni", covariance, projections[:, 0])
         amount, variance, along = shift[:, -1:], covariance[:, -1, -1:], covariance[:, :, -1]
-        total = variance + np.square(SIZES) * (self.deviations > 0.0)[:, None]  # (cases, sizes)
-        base = np.where(self._is_plain | (self.deviations > 0.0), self.products.base, -np.inf)
+        deviates = self.rig.deviation[cases] > 0.0
+        total = variance + np.square(SIZES) * deviates[:, None]  # (cases, sizes)
+        base = np.where(self.rig.is_plain[cases] | deviates, self.project(cases).base, -np.inf)
         gain = 0.5 * (np.log(variance / total) + np.square(amount) * (1.0 / variance - 1.0 / total))
-        share = np.exp(base[:, None] + gain - _log_sum(base[:, None] + gain))
+        share = softmax(base[:, None] + gain)
         means = shift[:, None] - along[:, None] * (amount / total)[..., None]
         mean = np.einsum("ns,nsi->i", share, means)
         matrix = np.einsum("n,nij->ij", share.sum(axis=1), covariance)
@@ -307,29 +298,23 @@ class LinearModel:
         matrix += np.einsum("ns,nsi,nsj->ij", share, means - mean, means - mean)
         return -mean[:-1], matrix[:-1, :-1]
 
-    def amounts(self, number: int) -> tuple[Array, Array]:
-        """Posterior mean and covariance of the amounts of a group whose g columns act together.
+    def amounts(self, groups: GroupSet, cases: Array) -> tuple[Array, Array]:
+        """Posterior mean and covariance of the amounts of each of b groups with g columns that act together.
 
         Args:
-            number: index of the group in `groups`.
+            groups: the groups, with equal changes of the stiffness.
+            cases: indices of the noise cases, with rig errors within the stated accuracy.
 
         Returns:
-            Mean, (g,), and covariance, (g, g), averaged over all sizes of the amounts and of the rig's errors.
+            Mean, (b, g), and covariance, (b, g, g), averaged over all sizes of the amounts and of the rig's errors.
         """
-        width, block = next(
-            (width, int(np.flatnonzero(numbers == number)[0]))
-            for width, (numbers, _) in enumerate(self.groups.blocks if self.groups else ())
-            if number in numbers
-        )
-        chosen, products = self._is_plain, self.products
-        gain, means, variances, vectors = _posterior(
-            products.grams[width][chosen, block], products.projections[width][chosen, block]
-        )
-        gain = gain + products.base[chosen, None]
-        share = np.exp(gain - _log_sum(gain))
-        mean = np.einsum("ns,nsi->i", share, means)
-        spread = np.einsum("nij,nj,nkj->ik", vectors, np.einsum("ns,nsj->nj", share, variances), vectors)
-        return mean, spread + np.einsum("ns,nsi,nsj->ij", share, means - mean, means - mean)
+        projection = self.project(cases)
+        ((_, projections, gram),) = projection.products(groups)
+        gain, means, variances, vectors = _posterior(gram, projections)
+        share = softmax(gain + projection.base[:, None, None], axis=(0, 2))
+        mean = np.einsum("nbs,nbsi->bi", share, means)
+        spread = np.einsum("nbij,nbj,nbkj->bik", vectors, np.einsum("nbs,nbsj->nbj", share, variances), vectors)
+        return mean, spread + np.einsum("nbs,nbsi,nbsj->bij", share, means - mean[:, None], means - mean[:, None])
 
 
 def _scale_information(grams: Array, rows: Array, precision: Array) -> tuple[Array, Array]:
@@ -345,12 +330,6 @@ def _scale_information(grams: Array, rows: Array, precision: Array) -> tuple[Arr
     """
     scale = np.sqrt(np.maximum(np.einsum("kn,kn->k", rows, rows) + precision, np.finfo(float).tiny))
     return scale, (grams + np.diag(precision)) / np.outer(scale, scale) + _ROUNDING * np.eye(scale.size)
-
-
-def _log_sum(values: Array) -> float:
-    """Natural log of the sum of exp(values); far faster than `scipy.special.logsumexp` for short arrays."""
-    peak = values.max()
-    return float(peak + np.log(np.sum(np.exp(values - peak))))
 
 
 def _posterior(gram: Array, projections: Array) -> tuple[Array, Array, Array, Array]:
@@ -373,26 +352,41 @@ def _posterior(gram: Array, projections: Array) -> tuple[Array, Array, Array, Ar
     return gain, -(prior_variance * projections / grown) @ vectors.swapaxes(-1, -2), variances, vectors
 
 
-def _block_gains(gram: Array, projections: Array, units: Sequence[Array], senses: Array) -> tuple[Array, Array]:
-    """Gains in log evidence and squared relative changes of |K| for blocks of columns that act together.
+def _block_gains(batch: Batch, projections: Array, gram: Array) -> tuple[Array, Array]:
+    """Gains in log evidence and squared relative changes of |K| of each block, for each prior size of its amounts.
 
     Args:
-        gram: inner products U^T P U within the blocks, (cases, blocks, width, width).
+        batch: blocks of columns that act together.
         projections: inner products U^T P r with the residuals, (cases, blocks, width).
-        units: relative change of |K| per unit amount at p operating points, (width, p) for each block.
-        senses: +1 for a block of one column whose amount must be positive, else 0, (blocks,).
+        gram: inner products U^T P U within the blocks, (cases, blocks, width, width).
 
     Returns:
-        Gains and squared changes for each of `priors.SIZES`, (blocks, cases, sizes) each.
+        Gains and squared changes for each of `priors.SIZES`, (cases, blocks, sizes) each.
     """
     gain, amounts, variances, _ = _posterior(gram, projections)
-    if senses.any():
-        standardised = senses[:, None] * (amounts / np.sqrt(variances))[..., 0]
-        gain = np.where(senses[:, None] != 0, gain + np.log(2.0) + log_ndtr(standardised), gain)
-    if gram.shape[-1] == 1:
-        changes = np.square(amounts[..., 0] * np.array([np.abs(unit).max() for unit in units])[:, None])
-    else:
-        changes = np.stack(
-            [np.square(np.abs(amounts[:, block] @ unit)).max(axis=-1) for block, unit in enumerate(units)], axis=1
-        )
-    return gain.swapaxes(0, 1), changes.swapaxes(0, 1)
+    if (signs := batch.signs[:, None]).any():
+        standardised = signs * (amounts / np.sqrt(variances))[..., 0]
+        gain = np.where(signs != 0, gain + np.log(2.0) + log_ndtr(standardised), gain)
+    return gain, np.square(np.abs(amounts @ batch.unit)).max(axis=-1)
+
+
+def _average(groups: Array, log_evidence: Array, changes: Array) -> list[GroupEvidence]:
+    """Average the evidence for explanations over noise cases, blocks and prior sizes of the amounts.
+
+    Args:
+        groups: index of the group of each block, ascending, (blocks,).
+        log_evidence: natural log of prior weight times evidence, (cases, blocks, sizes).
+        changes: squared relative change of |K|, (cases, blocks, sizes).
+
+    Returns:
+        Evidence for each group, in order.
+    """
+    first = np.flatnonzero(np.diff(groups, prepend=-1))
+    by_block = logsumexp(log_evidence, axis=0) if len(log_evidence) else np.full(log_evidence.shape[1:], -np.inf)
+    by_size = np.logaddexp.reduceat(by_block, first, axis=0)
+    total, count = logsumexp(by_size, axis=1), np.diff(first, append=len(groups)) * SIZES.size
+    share = np.exp(log_evidence - np.repeat(total, np.diff(first, append=len(groups)))[:, None])
+    squares = np.add.reduceat(np.sum(share * changes, axis=(0, 2)), first)
+    likeliest = SIZES[np.argmax(by_size, axis=1)]
+    values = (total - np.log(count), np.sqrt(squares), likeliest)
+    return [GroupEvidence(*triple) for triple in zip(*(value.tolist() for value in values), strict=True)]

@@ -11,7 +11,7 @@ Notes:
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise, product
 from math import log
@@ -25,7 +25,7 @@ from bushfit.diagnosis.explanations import Group
 from bushfit.diagnosis.linear_model import LinearModel
 from bushfit.diagnosis.priors import DECISIVE_CHI_SQUARE
 from bushfit.diagnosis.projected_columns import GroupSet
-from bushfit.diagnosis.rig_errors import in_scatter_units, rig_errors
+from bushfit.diagnosis.rig_errors import RigErrors, in_scatter_units, rig_errors
 from bushfit.diagnosis.smooth_deviations import unnamed_curves
 from bushfit.effects.contract import Array
 from bushfit.fitting.coordinates import Bounds, Coordinates, coordinate_bounds
@@ -168,12 +168,6 @@ class Term:
         ends = np.cumsum([0, *(test.frequency.size for test in tests)]).tolist()
         return [(test, slice(*pair)) for test, pair in zip(tests, pairwise(ends), strict=True)]
 
-    @property
-    def has_one_meaning(self) -> bool:
-        """True if the added stiffness has one unit: there are tests, of translation only or of rotation only."""
-        motions = {test.direction.motion for test, _ in self.tests}
-        return len(motions) == 1 if self.measure == "stiffness" else bool(motions)
-
     @cached_property
     def points(self) -> Array:
         """Centred natural logs of frequency and motion (displacement, rotation or strain) at each point, (p, 2)."""
@@ -265,28 +259,29 @@ def nearest_power_law(
     """
     bare, model = in_scatter_units(fitted), fitted.model
     begun = model.with_values({name: value for name, value in start.items() if name in model.values})
-    rows, smooth_curves = bare.jacobian, [curve.group for curve in unnamed_curves(bare) if curve.group]
-    errors = rig_errors(bare, rig)
-    plain = LinearModel(bare.residual, rows, np.zeros(len(rows)), errors, GroupSet(smooth_curves, errors))
-    plain = replace(plain, chosen_cases=plain.likely_cases(_NEAR))
-    terms = [term for measure in _MEASURES if (term := Term(bare, measure)).has_one_meaning]
-    settled = (_settled_grid(fitted, term, plain, begun, bounds) for term in terms)
+    rows, errors = bare.jacobian, rig_errors(bare, rig)
+    curves = GroupSet([curve.group for curve in unnamed_curves(bare) if curve.group], errors)
+    cases = LinearModel(bare.residual, rows, np.zeros(len(rows)), errors).likely_cases(curves, _NEAR)
+    motions = {test.direction.motion for test in fitted.data_sets} - {STRAINING}
+    measures = [measure for measure in _MEASURES if motions and (measure != "stiffness" or len(motions) == 1)]
+    terms = [Term(bare, measure) for measure in measures]  # one unit: of translation only, or of rotation only
+    settled = (_settled_grid(fitted, term, errors, cases, begun, bounds) for term in terms)
     grids = sorted(filter(None, settled), key=lambda grid: -grid.log_evidence)
-    if not grids or grids[0].log_evidence < grids[0].linear.evidence.log_evidence:
+    if not grids or grids[0].log_evidence < logsumexp(grids[0].linear.project(cases).base):
         return None
+    of_curves = grids[0].linear.group_evidence([curves], cases)  # around the same parameters and term
     log_ratios = np.array([grid.log_evidence - grids[0].log_evidence for grid in grids])
-    others = zip(grids[1:], log_ratios[1:], strict=True)
-    alternatives = tuple(grid.measure for grid, gain in others if gain > -0.5 * DECISIVE_CHI_SQUARE)
+    likely = log_ratios > -0.5 * DECISIVE_CHI_SQUARE
+    measure, *alternatives = [grid.measure for grid, is_likely in zip(grids, likely, strict=True) if is_likely]
     counts = np.round(_DRAWS * np.exp(log_ratios)).astype(int).tolist()
     draws = np.concatenate([grid.draws(count) for grid, count in zip(grids, counts, strict=True)], axis=-1)
     middle = np.angle(np.exp(1j * draws[0]).mean())
     draws[0] = np.degrees(middle + np.angle(np.exp(1j * (draws[0] - middle))))
     phase, p, q = (tuple(quantiles) for quantiles in np.quantile(draws, (0.5, 0.025, 0.975), axis=-1).T.tolist())
     law = logsumexp(log_ratios) + grids[0].log_evidence - log(len(grids))
-    curves = replace(grids[0].linear, groups=plain.groups).group_evidence  # around the same parameters and term
-    smooth = logsumexp([evidence.log_evidence for evidence in curves]) - log(len(curves))
+    smooth = logsumexp([evidence.log_evidence for evidence in of_curves]) - log(len(of_curves))
     of_one_place = len({test.direction for test in fitted.data_sets}) == 1
-    return PowerLaw(grids[0].measure, alternatives, phase, p, q, bool(law > smooth), of_one_place)
+    return PowerLaw(measure, tuple(alternatives), phase, p, q, bool(law > smooth), of_one_place)
 
 
 @dataclass(frozen=True, eq=False)
@@ -295,52 +290,54 @@ class _Grid:
 
     Args:
         measure: unit of the added stiffness.
-        linear: linearised model with one group of two columns (in phase and in quadrature) for each pair of powers.
+        linear: linearised model without the added stiffness.
+        groups: one group of two columns (in phase and in quadrature) for each pair of powers.
+        cases: indices of the noise cases to average over.
         powers: powers of frequency and amplitude, (g, 2).
         step: spacing of the grid along each axis, (2,); 0 along an axis on which the tests do not differ.
     """
 
     measure: Measure
     linear: LinearModel
+    groups: GroupSet
+    cases: Array
     powers: Array
     step: Array
 
     @cached_property
     def log_evidences(self) -> Array:
         """Natural log of the tests' evidence for each pair of powers of frequency and amplitude, (g,)."""
-        return np.array([evidence.log_evidence for evidence in self.linear.group_evidence])
-
-    @property
-    def share(self) -> Array:
-        """Posterior probability of each of the g pairs of powers of frequency and amplitude, (g,)."""
-        return np.asarray(softmax(self.log_evidences))
+        return np.array([x.log_evidence for x in self.linear.group_evidence([self.groups], self.cases)])
 
     @property
     def log_evidence(self) -> float:
         """Natural log of the evidence of the tests, averaged over all pairs of powers with equal prior probability."""
-        filled = np.log(np.where(self.step > 0.0, self.step / (2.0 * _LARGEST_POWER), 1.0)).sum()
-        return float(logsumexp(self.log_evidences) + filled)
+        share = np.where(self.step > 0.0, self.step / (2.0 * _LARGEST_POWER), 1.0)
+        return float(logsumexp(self.log_evidences) + np.log(share).sum())
 
     def draws(self, count: int) -> Array:
         """Draw phase [rad], frequency power and amplitude power from the posterior, (3, count)."""
         random = np.random.default_rng(0)
-        chosen = random.choice(len(self.powers), count, p=self.share)
+        chosen = random.choice(len(self.powers), count, p=softmax(self.log_evidences))
         width = np.where(self.step > 0.0, self.step, 2.0 * _LARGEST_POWER)  # an axis without a change is unknown
         powers = self.powers[chosen] + width * (random.random((count, 2)) - 0.5)
-        parts = np.empty((count, 2))
+        parts, (means, covariances) = np.empty((count, 2)), self.linear.amounts(self.groups, self.cases)
         for pair in np.unique(chosen):
             mask = chosen == pair
-            parts[mask] = random.multivariate_normal(*self.linear.amounts(int(pair)), mask.sum(), method="eigh")
+            parts[mask] = random.multivariate_normal(means[pair], covariances[pair], mask.sum(), method="eigh")
         return np.stack((np.arctan2(parts[:, 1], parts[:, 0]), *powers.T))
 
 
-def _settled_grid(fitted: FitResult, term: Term, plain: LinearModel, model: Model, bounds: Bounds) -> _Grid | None:
+def _settled_grid(
+    fitted: FitResult, term: Term, rig: RigErrors, cases: Array, model: Model, bounds: Bounds
+) -> _Grid | None:
     """Find the powers of frequency and amplitude nearest to a gap, on a grid that narrows about the likeliest pair.
 
     Args:
         fitted: the fitted model and the tests.
         term: complex stiffness that is added to the model, with its unit.
-        plain: linearised model without the added stiffness, from which the errors of the rig are taken.
+        rig: errors of the rig.
+        cases: indices of the noise cases to average over.
         model: model at its starting parameters.
         bounds: limits of parameters inside their general limits.
 
@@ -357,11 +354,12 @@ def _settled_grid(fitted: FitResult, term: Term, plain: LinearModel, model: Mode
         step = np.ptp(ends, axis=0) / (_GRID - 1)
         shapes = term.scaled(np.exp(powers @ term.points.T), model)
         residuals, rows, columns = term.linearised(model, value, shapes)
-        groups = [Group(pair, np.ones(2), act_together=True) for pair in columns]
-        linear = replace(plain, residual=residuals, jacobian=rows, groups=GroupSet(groups, plain.rig))
-        grid = _Grid(term.measure, linear, powers, step)
-        before, middle = middle, grid.share @ powers
-        spread = np.sqrt(grid.share @ np.square(powers - middle))
+        groups = [Group(pair, np.ones((2, 1)), act_together=True) for pair in columns]
+        linear = LinearModel(residuals, rows, np.zeros(len(rows)), rig)
+        grid = _Grid(term.measure, linear, GroupSet(groups, rig), cases, powers, step)
+        share = softmax(grid.log_evidences)
+        before, middle = middle, share @ powers
+        spread = np.sqrt(share @ np.square(powers - middle))
         shift = np.abs(middle - before)
         if (shift <= _RESTS * spread).all() and (step <= spread).all():
             return grid

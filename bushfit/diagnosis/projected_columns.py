@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -30,19 +32,13 @@ class RigRows:
     rig: RigErrors
 
     @cached_property
-    def halves(self) -> list[Array]:
-        """Parts of the rows at residuals whose scatter differs between noise cases, and at all others."""
-        scatters = np.zeros(self.rows.shape[1], dtype=bool)
-        for block in self.rig.blocks:
-            scatters[block.rows] |= block.scatters
-        return [_select_columns(self.rows, mask) for mask in (scatters, ~scatters)]
-
-    @cached_property
     def shared(self) -> Array:
-        """Inner products of the rows with the w errors of each block of the rig, (blocks, w, m)."""
-        shared = np.zeros((len(self.rig.blocks), self.rig.roots[0].shape[-1], len(self.rows)))
+        """Inner products of the rows with the w errors of each block of the rig, (scatters, blocks, w, m)."""
+        weights, roots = self.rig.weights[0], self.rig.roots[0]
+        shared = np.zeros((len(weights), *roots.shape[1:3], len(self.rows)))
         for number, block in enumerate(self.rig.blocks):
-            shared[number, : len(block.kinds)] = block.columns @ self.rows[:, block.rows].T
+            weighted = block.columns * weights[:, None, block.rows]
+            shared[:, number, : len(block.kinds)] = weighted @ self.rows[:, block.rows].T
         return shared
 
     def inner(self, other: RigRows, combinations: Array) -> Array:
@@ -57,12 +53,16 @@ class RigRows:
         """
         if len(self.rows) > len(other.rows):  # the smaller set is weighted
             return other.inner(self, combinations).swapaxes(1, 2)
-        roots = self.rig.roots[0][combinations]
-        count = self.shared.shape[0] * self.shared.shape[1]
-        weighted = (roots.swapaxes(-1, -2) @ (roots @ self.shared)).reshape(len(roots), count, len(self.rows))
-        scattering, steady = (first @ second.T for first, second in zip(self.halves, other.halves, strict=True))
-        among_errors = weighted.swapaxes(1, 2) @ other.shared.reshape(count, len(other.rows))
-        return self.rig.precision[combinations, None, None] * scattering + steady - among_errors
+        products = np.empty((len(combinations), len(self.rows), len(other.rows)))
+        weights, scatter = self.rig.weights
+        for number in np.unique(scatter[combinations]):
+            chosen = scatter[combinations] == number
+            roots = self.rig.roots[0][combinations[chosen]]
+            errors = roots.swapaxes(-1, -2) @ (roots @ self.shared[number])
+            errors = errors.reshape(len(roots), roots.shape[1] * roots.shape[2], len(self.rows)).swapaxes(1, 2)
+            among_errors = errors @ other.shared[number].reshape(errors.shape[-1], len(other.rows))
+            products[chosen] = self.rows * weights[number] @ other.rows.T - among_errors
+        return products
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,6 +103,24 @@ class CompoundDeviation:
         return np.square(np.abs(np.einsum("nij,nj->ni", vectors, amounts) @ self.group.unit)).max(axis=-1)
 
 
+class Batch(NamedTuple):
+    """Blocks with the same number of columns and the same change of the stiffness, for array operations.
+
+    A block is a set of columns that act together.
+
+    Args:
+        groups: index of the group of each block, ascending, (blocks,).
+        columns: indices of the columns of each block among those of all groups, (blocks, width).
+        signs: +1 for a block of one column whose amount must be positive, else 0, (blocks,).
+        unit: relative change of the stiffness per unit amount at p operating points, (width, p).
+    """
+
+    groups: Array
+    columns: Array
+    signs: Array
+    unit: Array
+
+
 @dataclass(frozen=True, eq=False)
 class GroupSet:
     """Explanations to compare, with the inner products of their columns that are the same for every fitted model.
@@ -130,45 +148,45 @@ class GroupSet:
         return RigRows(np.concatenate([group.scaled for group in self.groups]), self.rig)
 
     @cached_property
-    def blocks(self) -> list[tuple[Array, Array]]:
-        """Blocks of columns that act together, by width: those of a group are one block, or one block each.
-
-        Returns:
-            For each width, the index of each block's group, (blocks,), and the indices of its columns among those of
-            all groups, (blocks, width).
-        """
-        ends = np.cumsum([0, *(len(group.columns) for group in self.groups)])
-        by_width: dict[int, list[tuple[int, Array]]] = {}
-        for number, (group, (start, stop)) in enumerate(zip(self.groups, pairwise(ends.tolist()), strict=True)):
-            rows = np.arange(start, stop)
-            for block in rows[None] if group.act_together else rows[:, None]:
-                by_width.setdefault(block.size, []).append((number, block))
-        return [tuple(map(np.array, zip(*blocks, strict=True))) for blocks in by_width.values()]  # type: ignore[misc]
+    def batches(self) -> list[Batch]:
+        """Blocks of columns that act together: those of a group are one block, or one block each."""
+        first, alike = 0, defaultdict[tuple[int, bytes], list[tuple[int, Array, int]]](list)
+        units = dict[tuple[int, bytes], Array]()
+        for number, group in enumerate(self.groups):
+            rows = np.arange(first, first := first + len(group.columns))
+            unit = group.unit if group.act_together else np.eye(1)
+            blocks = rows[None] if group.act_together else rows[:, None]
+            key = blocks.shape[1], unit.tobytes()
+            units[key] = unit
+            alike[key] += [(number, block, group.sign) for block in blocks]
+        arrays = [[np.array(values) for values in zip(*blocks, strict=True)] for blocks in alike.values()]
+        return [
+            Batch(groups, columns, signs, unit)
+            for (groups, columns, signs), unit in zip(arrays, units.values(), strict=True)
+        ]
 
     @cached_property
     def _products_within(self) -> list[Array]:
-        """Inner products within the blocks of each width, of both halves of the rows, (2, blocks, width, width)."""
-        by_width = []
-        for _, blocks in self.blocks:
-            products = np.zeros((2, *blocks.shape, blocks.shape[1]))
-            for product, half in zip(products, self.rows.halves, strict=True):
-                filled = np.asarray(half.any(axis=1))[blocks].any(axis=1)  # others are skipped for speed
-                product[filled] = half[blocks[filled]] @ half[blocks[filled]].swapaxes(-1, -2)
-            by_width.append(products)
-        return by_width
+        """Inner products within the blocks of each batch without rig errors, (scatters, blocks, width, width)."""
+        by_batch = []
+        for batch in self.batches:
+            rows = self.rows.rows[batch.columns]
+            by_batch.append(np.array([rows * weight @ rows.swapaxes(-1, -2) for weight in self.rig.weights[0]]))
+        return by_batch
 
     def within(self, combinations: Array) -> list[Array]:
         """Inner products within the blocks for c combinations of sizes of the rig's errors, computed once for each.
 
         Returns:
-            Products for each width of blocks, (c, blocks, width, width).
+            Products for each batch of blocks, (c, blocks, width, width).
         """
         for n in combinations.tolist():
             if n not in self._within:
-                errors = (self.rig.roots[0][n] @ self.rows.shared).reshape(-1, len(self.rows.rows)).T
+                scatter = self.rig.weights[1][n]
+                errors = (self.rig.roots[0][n] @ self.rows.shared[scatter]).reshape(-1, len(self.rows.rows)).T
                 self._within[n] = [
-                    self.rig.precision[n] * scattering + steady - errors[block] @ errors[block].swapaxes(-1, -2)
-                    for (_, block), (scattering, steady) in zip(self.blocks, self._products_within, strict=True)
+                    products[scatter] - errors[batch.columns] @ errors[batch.columns].swapaxes(-1, -2)
+                    for batch, products in zip(self.batches, self._products_within, strict=True)
                 ]
         return [np.stack(arrays) for arrays in zip(*(self._within[n] for n in combinations.tolist()), strict=True)]
 
@@ -185,16 +203,3 @@ class GroupSet:
             products = compound.inner(self.rows, np.array([n for _, n in missing]))
             self._modes.update(zip(missing, products, strict=True))
         return np.stack([self._modes[key] for key in keys])
-
-
-def _select_columns(rows: Array, chosen: Array) -> Array:
-    """Select columns of a matrix by a mask; a view without a copy if the selected columns are adjacent.
-
-    Args:
-        rows: matrix, (m, n).
-        chosen: mask of the columns, (n,).
-    """
-    places = np.flatnonzero(chosen)
-    if places.size and places[-1] - places[0] + 1 == places.size:
-        return rows[:, places[0] : places[-1] + 1]
-    return rows[:, places]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 from bushfit.campaign.schema import RigSettings
@@ -14,7 +14,45 @@ from bushfit.diagnosis.projected_columns import CompoundDeviation, GroupSet
 from bushfit.diagnosis.record import DiagnosisSettings
 from bushfit.diagnosis.rig_errors import RigErrors, in_scatter_units, rig_errors
 from bushfit.diagnosis.smooth_deviations import compound, unnamed_curves
+from bushfit.effects.contract import Array
 from bushfit.fitting.problem import FitResult
+
+
+@dataclass(frozen=True, eq=False)
+class ExplanationColumns:
+    """Explanations of a gap that do not depend on effects, and what is part of every hypothesis.
+
+    Changes of the residuals are in units of the scatter from point to point.
+
+    Args:
+        explanations: faulty parts of the tests, and smooth curves.
+        deviation: changes of the residuals if the rubber deviates smoothly from the model's laws; None without tests.
+        errors: errors of the rig.
+    """
+
+    explanations: Sequence[Explanation]
+    deviation: Group | None
+    errors: RigErrors
+
+    @cached_property
+    def compound(self) -> CompoundDeviation | None:
+        """Deviation of the compound beside the errors of the rig; None without tests."""
+        return CompoundDeviation(self.deviation, self.errors) if self.deviation else None
+
+    @cached_property
+    def sets(self) -> list[GroupSet]:
+        """Columns of `explanations`."""
+        return GroupSet.split([e.group for e in self.explanations if e.group], self.errors)
+
+    @cached_property
+    def curves(self) -> GroupSet | None:
+        """Columns of the smooth curves among `explanations`; None without tests."""
+        curves = [e.group for e in self.explanations if e.group and e.kind == "unnamed"]
+        return GroupSet(curves, self.errors) if curves else None
+
+    def with_variance(self, variance: Array) -> ExplanationColumns:
+        """Add independent errors of the residuals, of the given variances, (n,)."""
+        return replace(self, errors=replace(self.errors, variance=variance))
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,23 +81,15 @@ class RecordedTests:
     def bare(self) -> FitResult:
         """Fit of the starting model with residuals in units of the scatter from point to point, to compare hypotheses.
 
-        Errors that points share are not part of this unit; `errors` describes them.
+        Errors that points share are not part of this unit; `columns.errors` describes them.
         """
         return in_scatter_units(self.base)
 
     @cached_property
-    def errors(self) -> RigErrors:
-        """Rig errors that points share, as changes of the residuals in units of the scatter from point to point."""
-        return rig_errors(self.bare, self.rig)
-
-    @cached_property
-    def compound(self) -> CompoundDeviation | None:
-        """Changes of the residuals, in units of the scatter, if the rubber deviates smoothly from the model's laws.
-
-        Hypotheses are compared with these changes. None without tests.
-        """
-        group = compound(self.bare)
-        return CompoundDeviation(group, self.errors) if group else None
+    def columns(self) -> ExplanationColumns:
+        """Explanations that do not depend on effects, beside the compound's deviation and the errors of the rig."""
+        explanations, group = [*find_faulty_parts(self.bare), *unnamed_curves(self.bare)], compound(self.bare)
+        return ExplanationColumns(explanations, group, rig_errors(self.bare, self.rig))
 
     @cached_property
     def compound_in_fits(self) -> Group | None:
@@ -73,19 +103,3 @@ class RecordedTests:
     def faulty_parts_in_fits(self) -> dict[str, FaultyPart]:
         """Faulty parts by name; their changes of the residuals are whitened as in a fit, not in units of scatter."""
         return {part.name: part for part in find_faulty_parts(self.base)}
-
-    @cached_property
-    def explanations(self) -> list[Explanation]:
-        """Explanations of the gap that are independent of the model's effects: faulty test parts, and smooth curves."""
-        return [*find_faulty_parts(self.bare), *unnamed_curves(self.bare)]
-
-    @cached_property
-    def explanation_sets(self) -> list[GroupSet]:
-        """Columns of `explanations`."""
-        return GroupSet.split([e.group for e in self.explanations if e.group], self.errors)
-
-    @cached_property
-    def curves(self) -> GroupSet | None:
-        """Columns of the smooth curves among `explanations`; None without tests."""
-        curves = [e.group for e in self.explanations if e.group and e.kind == "unnamed"]
-        return GroupSet(curves, self.errors) if curves else None

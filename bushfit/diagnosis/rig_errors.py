@@ -69,10 +69,27 @@ class RigErrors:
     Args:
         blocks: sets of residual rows that share errors, with residuals in units of the scatter from point to point.
         cases: assumptions on the sizes of the errors, over which the evidence is averaged.
+        variance: variance of a further independent error of each of the n residuals, (n,).
     """
 
     blocks: Sequence[Block]
     cases: Sequence[NoiseCase]
+    variance: Array
+
+    @cached_property
+    def log_weight(self) -> Array:
+        """Natural log of the prior probability of each case, (cases,)."""
+        return np.array([case.log_weight for case in self.cases])
+
+    @cached_property
+    def deviation(self) -> Array:
+        """Standard deviation of the compound's deviation from the model in each case, relative to |K|, (cases,)."""
+        return np.array([case.compound for case in self.cases])
+
+    @cached_property
+    def is_plain(self) -> Array:
+        """Mask of the cases with rig errors within the stated accuracy and without a deviation of the compound."""
+        return np.array([not case.wide and case.compound == 0.0 for case in self.cases])
 
     @cached_property
     def combinations(self) -> tuple[Array, Array]:
@@ -87,37 +104,45 @@ class RigErrors:
         return distinct, index.ravel()
 
     @cached_property
-    def roots(self) -> tuple[Array, Array]:
-        """Factors of the covariance of the rig's errors for every combination of sizes.
+    def weights(self) -> tuple[Array, Array]:
+        """Reciprocal variances of the residuals without the errors that points share.
 
         Returns:
-            L^-1 D of S = 1 + D W W^T D = L L^T, (combinations, blocks, w, w), with the errors' columns W and sizes D;
-            and the natural log of the determinant of the covariance of scatter and rig errors, (combinations,).
-
-        Notes:
-            For rows R, the whitened inner products are R R^T - (L^-1 D W R^T)^T (L^-1 D W R^T).
+            Values for each size of the scatter, (scatters, n); and the index of this size for each combination,
+            (combinations,).
         """
-        sizes, _ = self.combinations
-        width = max((len(block.kinds) for block in self.blocks), default=0)
-        inner = np.zeros((len(self.blocks), width, width))
-        kinds = np.full(inner.shape[:2], -1)
-        for number, block in enumerate(self.blocks):
-            count = len(block.kinds)
-            inner[number, :count, :count] = block.columns @ block.columns.T
-            kinds[number, :count] = block.kinds
-        scatters = np.array([block.scatters for block in self.blocks], dtype=bool)
-        share = np.where(scatters, 1.0 / sizes[:, :1], 1.0)[..., None]
-        errors = np.pad(sizes[:, 1:], ((0, 0), (0, 1)))[:, kinds] * share
-        root = np.linalg.cholesky(np.eye(width) + errors[..., None] * inner * errors[..., None, :])
-        scattering = {row for block in self.blocks if block.scatters for row in block.rows.tolist()}
-        log_det = 2.0 * np.sum(np.log(np.einsum("nbii->nbi", root)), axis=(1, 2))
-        log_det -= len(scattering) * np.log(self.precision)
-        return np.linalg.inv(root) * (errors * share)[..., None, :], log_det
+        scatters, index = np.unique(self.combinations[0][:, 0], return_inverse=True)
+        variances = np.ones((scatters.size, self.variance.size))
+        for block in self.blocks:
+            if block.scatters:
+                variances[:, block.rows] = np.square(scatters)[:, None]
+        return 1.0 / (variances + self.variance), index
 
     @cached_property
-    def precision(self) -> Array:
-        """Estimated variance of the scatter of sweeps over the assumed one, in each combination, (combinations,)."""
-        return 1.0 / np.square(self.combinations[0][:, 0])
+    def roots(self) -> tuple[Array, Array]:
+        """Factors of the covariance N + W^T D^2 W of scatter N and rig errors W of sizes D, for every combination.
+
+        Returns:
+            L^-1 D of 1 + D W N^-1 W^T D = L L^T, (combinations, blocks, w, w); and the natural log of the determinant
+            of the covariance, (combinations,).
+
+        Notes:
+            Whitened inner products of rows R are R N^-1 R^T - (L^-1 D W N^-1 R^T)^T (L^-1 D W N^-1 R^T).
+        """
+        sizes, _ = self.combinations
+        weights, scatter = self.weights
+        width = max((len(block.kinds) for block in self.blocks), default=0)
+        inner = np.zeros((len(weights), len(self.blocks), width, width))
+        kinds = np.full(inner.shape[1:3], -1)
+        for number, block in enumerate(self.blocks):
+            count = len(block.kinds)
+            inner[:, number, :count, :count] = block.columns * weights[:, None, block.rows] @ block.columns.T
+            kinds[number, :count] = block.kinds
+        errors = np.pad(sizes[:, 1:], ((0, 0), (0, 1)))[:, kinds]
+        root = np.linalg.cholesky(np.eye(width) + errors[..., None] * inner[scatter] * errors[..., None, :])
+        log_det = 2.0 * np.sum(np.log(np.einsum("nbii->nbi", root)), axis=(1, 2))
+        log_det -= np.sum(np.log(weights), axis=1)[scatter]
+        return np.linalg.inv(root) * errors[..., None, :], log_det
 
 
 def in_scatter_units(fit: FitResult) -> FitResult:
@@ -148,7 +173,7 @@ def rig_errors(fit: FitResult, rig: RigSettings) -> RigErrors:
         fit: the fitted model and the tests, with residuals in units of the scatter from point to point.
         rig: accuracy class that [rig] states; its gain error (relative) and phase error [rad] set the size of an error.
     """
-    return RigErrors(list(error_blocks(fit, rig)), noise_cases(fit))
+    return RigErrors(list(error_blocks(fit, rig)), noise_cases(fit), np.zeros(fit.residual.size))
 
 
 def noise_cases(fit: FitResult) -> list[NoiseCase]:

@@ -81,8 +81,8 @@ class Search:
         tests = RecordedTests(self.base, self.data.campaign.rig, settings.without, log_prior, max_effects=limit)
         self.root = SearchState.of_tests(tests)
         self._fit_rivals = partial(fit_rivals, fixed=self.base.fixed, bounds=self.data.bounds)
-        self._log_priors = prior_odds([*self.root.proposals, *tests.explanations])
-        families = {e.family for e in (*self.outlier_clusters, *tests.explanations) if e.kind == "part"}
+        self._log_priors = prior_odds([*self.root.proposals, *tests.columns.explanations])
+        families = {e.family for e in (*self.outlier_clusters, *tests.columns.explanations) if e.kind == "part"}
         self._meeting_odds = log(ODDS["part"] / max(len(families), 1)) - tests.log_prior
 
     def run(self) -> list[Hypothesis]:
@@ -236,7 +236,7 @@ class Search:
             better, worth = part, shifted
             if part.family != "loop":
                 scattered_part = part.point_by_point()
-                groups = GroupSet([scattered_part.group], state.tests.errors)  # type: ignore[list-item]
+                groups = GroupSet([scattered_part.group], state.columns.errors)  # type: ignore[list-item]
                 (scattered,) = state.weigh([groups])
                 better, worth = (scattered_part, scattered) if scattered.total > shifted.total else (part, shifted)
             log_odds = self._log_odds("part", part.name, depth)

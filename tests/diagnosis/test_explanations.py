@@ -36,7 +36,7 @@ def best(evidence: FitResult, every: Sequence[Explanation]) -> Explanation:
     rig = rig_errors(evidence, SHARED_RIG)
     solution = evidence
     precision = np.zeros(len(solution.jacobian))
-    worths = LinearModel(solution.residual, solution.jacobian, precision, rig, GroupSet(groups, rig)).group_evidence
+    worths = LinearModel(solution.residual, solution.jacobian, precision, rig).group_evidence([GroupSet(groups, rig)])
     return max(zip(known, worths, strict=True), key=lambda pair: pair[1].log_evidence)[0]
 
 

@@ -23,8 +23,9 @@ CASES = (
 )
 
 
-def ledger(seed: int, *, flat: int = 2, known: int = 1, rows: int = 10, groups: bool = True) -> LinearModel:
-    """Random numbers of everything: two blocks of which one scatters, rows in none, and a group of each sort."""
+def ledger(seed: int, *, flat: int = 2, known: int = 1, rows: int = 10) -> tuple[LinearModel, GroupSet]:
+    """Random numbers of everything: two blocks of which one scatters, rows in none, rows with a variance of their own,
+    and a group of each sort."""
     random = np.random.default_rng(seed)
     blocks = (
         Block(np.array([6, 0, 3]), random.normal(size=(3, 3)), np.array([0, 1, 1]), scatters=True),
@@ -41,9 +42,8 @@ def ledger(seed: int, *, flat: int = 2, known: int = 1, rows: int = 10, groups: 
     )
     precision = np.repeat([0.0, 0.5], [flat, known])
     jacobian = random.normal(size=(flat + known, rows))
-    rig = RigErrors(blocks, CASES)
-    chosen = GroupSet(made, rig) if groups else None
-    return LinearModel(3.0 * random.normal(size=rows), jacobian, precision, rig, chosen)
+    rig = RigErrors(blocks, CASES, np.where(np.arange(rows) % 3, 0.0, 0.7))
+    return LinearModel(3.0 * random.normal(size=rows), jacobian, precision, rig), GroupSet(made, rig)
 
 
 def covariance(of: LinearModel, node: NoiseCase) -> Array:
@@ -55,7 +55,9 @@ def covariance(of: LinearModel, node: NoiseCase) -> Array:
         sized = np.array(node.errors)[block.kinds, None] * block.columns
         whole[np.ix_(block.rows, block.rows)] += sized.T @ sized
     known = of.precision > 0.0
-    return np.diag(variance) + whole + (of.jacobian[known].T / of.precision[known]) @ of.jacobian[known]
+    return (
+        np.diag(variance + of.rig.variance) + whole + (of.jacobian[known].T / of.precision[known]) @ of.jacobian[known]
+    )
 
 
 def restricted(of: LinearModel, whole: Array) -> float:
@@ -77,11 +79,11 @@ def over_nodes(of: LinearModel, values: Sequence[float], *, wide: bool = False) 
 def test_worth_is_that_of_the_covariance_in_full(seed):
     """Of the rig and the parameters; and beside them of columns that move together, and of those of which one is
     chosen, over all sizes and nodes."""
-    of = ledger(seed)
+    of, groups = ledger(seed)
     plain = [restricted(of, covariance(of, node)) for node in of.rig.cases]
     assert of.evidence.log_evidence == pytest.approx(over_nodes(of, plain), abs=1e-6)
     assert of.log_evidence_with_level_errors == pytest.approx(over_nodes(of, plain, wide=True), abs=1e-6)
-    for group, worth in zip(of.groups.groups, of.group_evidence, strict=True):
+    for group, worth in zip(groups.groups, of.group_evidence([groups]), strict=True):
         if group.sign:
             continue
         parts = (
@@ -99,10 +101,10 @@ def test_worth_is_that_of_the_covariance_in_full(seed):
 @pytest.mark.parametrize("sense", [1, -1, 0])
 def test_an_amount_is_integrated_over_its_sense(sense):
     """Numerically, and the free parameter with it: where an effect is missing, the model stays below the tests."""
-    of = ledger(4, flat=1, known=0)
-    column, unit, own = of.groups.groups[0].columns[0], 0.7, of.jacobian[0]
+    of, groups = ledger(4, flat=1, known=0)
+    column, unit, own = groups.groups[0].columns[0], 0.7, of.jacobian[0]
     group = Group(column[None], np.array([unit]), act_together=False, sign=sense)
-    of = replace(of, chosen_cases=np.array([0]), groups=GroupSet((group,), of.rig))
+    (evidence,) = of.group_evidence([GroupSet((group,), of.rig)], np.array([0]))
     noise, spreads = multivariate_normal(cov=covariance(of, CASES[0])), SIZES / unit
     low, high = {1: (0.0, 1.0), -1: (-1.0, 0.0), 0: (-1.0, 1.0)}[sense]
     x, weight = np.polynomial.legendre.leggauss(300)
@@ -113,20 +115,20 @@ def test_an_amount_is_integrated_over_its_sense(sense):
         density = noise.pdf(shifted) @ (15.0 * weight) * norm.pdf(amounts, scale=spread) * (2.0 if sense else 1.0)
         whole += 3.5 * spread * (high - low) * weight @ density / spreads.size
     power = 0.5 * (of.residual.size - 1) * np.log(2.0 * np.pi)
-    assert of.group_evidence[0].log_evidence == pytest.approx(np.log(whole) + power + CASES[0].log_weight, abs=1e-4)
+    assert evidence.log_evidence == pytest.approx(np.log(whole) + power + CASES[0].log_weight, abs=1e-4)
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_a_deviation_of_the_compound_is_part_of_the_covariance(seed):
     """At every node of some size, beside nothing more and beside a group; at the others there is none."""
-    plain = ledger(seed)
+    plain, groups = ledger(seed)
     columns = np.random.default_rng(seed).normal(size=(2, plain.residual.size))
     sizes = (0.0, 0.3, 0.7)
     nodes = [replace(node, compound=size) for node in CASES[:2] for size in sizes]
-    rig = RigErrors(plain.rig.blocks, nodes)
+    rig = replace(plain.rig, cases=nodes)
     compound = CompoundDeviation(Group(columns, np.eye(2), act_together=True), rig)
-    of = replace(plain, rig=rig, groups=GroupSet(plain.groups.groups, rig), compound=compound)
-    group, size = of.groups.groups[0].columns, SIZES[:, None, None]
+    of = replace(plain, rig=rig, compound=compound)
+    group, size = groups.groups[0].columns, SIZES[:, None, None]
 
     def evidence(bent: bool, added: Array) -> float:
         own = [node for node in nodes if (node.compound > 0.0) is bent]
@@ -137,7 +139,7 @@ def test_a_deviation_of_the_compound_is_part_of_the_covariance(seed):
     assert of.evidence.log_evidence == pytest.approx(evidence(False, nothing), abs=1e-6)
     assert of.evidence.with_compound.log_evidence == pytest.approx(evidence(True, nothing), abs=1e-6)
     added = size**2 * (group.T @ group)
-    worth = of.group_evidence[0]
+    worth = of.group_evidence([GroupSet(groups.groups, rig)])[0]
     for bent, found in (
         (False, worth.log_evidence),
         (True, worth.with_compound.log_evidence if worth.with_compound else 0.0),
