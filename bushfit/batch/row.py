@@ -221,7 +221,7 @@ def estimate_quantities(result: Result, points: Sequence[Point]) -> tuple[dict[s
         predicted = predict_stiffness(result, place, [point.frequency], [point.amplitude])
         bands, units = (predicted.stiffness, predicted.loss_factor), (place.motion.stiffness_unit, "1")
         for name, band, unit in zip((STIFFNESS, LOSS_FACTOR), bands, units, strict=True):
-            value, low, high = (float(values[0]) for values in (band.value, band.low, band.high))
+            value, low, high = band.ends[:, 0].tolist()
             estimates[f"{name} {point}"] = Estimate.finite(value, low, high, None, unit)
         warnings.append(predicted.warnings)
     return estimates, warnings

@@ -19,7 +19,7 @@ from bushfit.geometry import default_places, get_places
 from bushfit.model.result import Result
 from bushfit.planning.campaign import campaign_toml
 from bushfit.planning.compound import guess_parameters
-from bushfit.planning.contract import Aim, Knowledge, PlanRequest, PredictionGrid, Test, operating_points
+from bushfit.planning.contract import Aim, Knowledge, PlanRequest, Test, operating_points
 from bushfit.planning.knowledge import from_campaign, from_result, with_rig_class
 from bushfit.planning.plan import Plan
 from bushfit.planning.plan import plan as choose_tests
@@ -83,14 +83,13 @@ def plan(
     settings, sweeps = grid_settings(requested_settings(grid), campaign), campaign.sweeps if campaign else ()
     wanted_places = [place for name in settings.directions or () for place in get_places(name, specimens)]
     start = Result(knowledge.model, specimens=specimens)
-    grids = tuple(
-        PredictionGrid(place, *requested_grid(default_grid(start, place, sweeps), settings, place))
-        for place in wanted_places or default
-    )
+    grids = {
+        place: requested_grid(default_grid(start, place, sweeps), settings, place) for place in wanted_places or default
+    }
     rig = with_rig_class(campaign.rig if campaign else RigSettings(), knowledge.noise)
     wanted, possible = dict[str, float](), {name: [name] for name in knowledge.names}
     for quantity in PREDICTED:
-        predictions = [f"{quantity}.{grid.place}" for grid in grids]
+        predictions = [f"{quantity}.{place}" for place in grids]
         possible |= {quantity: predictions, **{prediction: [prediction] for prediction in predictions}}
     for name, half_width in (targets or {}).items():
         if name not in possible:

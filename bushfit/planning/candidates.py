@@ -100,9 +100,9 @@ def candidates(knowledge: Knowledge, request: PlanRequest) -> list[Test]:
         standard = [test for test in paper_tests(knowledge, rig, place) if isinstance(test, SimulatedSweep)]
         if not standard:
             continue
-        grids = [grid for grid in request.grids if grid.place == place]
-        sizes = np.concatenate([*(grid.amplitudes for grid in grids), *(test.amplitudes for test in standard)])
-        rates = np.concatenate([*(grid.frequencies for grid in grids), *(test.frequencies for test in standard)])
+        predicted_rates, predicted_sizes = request.grids.get(place, ((), ()))
+        sizes = np.concatenate([predicted_sizes, *(test.amplitudes for test in standard)])
+        rates = np.concatenate([predicted_rates, *(test.frequencies for test in standard)])
         amplitudes = [_round_to_set_point(x) for x in np.geomspace(sizes.min(), 2.0 * sizes.max(), 6)]
         top = min(2.0 * float(rates.max()), rig.max_frequency or float(rates.max()))
         even = np.geomspace(0.2 * rates.min(), top, 7)

@@ -115,21 +115,6 @@ class Knowledge:
 
 
 @dataclass(frozen=True, eq=False)
-class PredictionGrid:
-    """Frequencies and amplitudes at which a plan reports the standard error of the predicted stiffness of a direction.
-
-    Args:
-        place: direction of the bushing, or specimen.
-        frequencies: frequencies [Hz].
-        amplitudes: zero-to-peak amplitudes [m, rad or strain].
-    """
-
-    place: Place
-    frequencies: Array
-    amplitudes: Array
-
-
-@dataclass(frozen=True, eq=False)
 class PlanRequest:
     """Aim of a plan, with the hours and limits of the rig.
 
@@ -138,7 +123,8 @@ class PlanRequest:
         hours: largest duration on the rig [h].
         rig: limits of the rig, and its time for a point and for a set-up.
         places: directions or specimens that the rig can test.
-        grids: operating points at which the plan reports the errors of the stiffness, whatever the aim.
+        grids: frequencies [Hz] and zero-to-peak amplitudes [m, rad or strain] at which the plan reports the errors of
+            the stiffness, whatever the aim, by direction or specimen.
         parameters: names of the parameters whose errors aim "parameters" minimises.
         targets: largest half width of the 95 % interval, relative to the value, by name of a parameter ("mu") or of a
             prediction ("stiffness.axial"). Aim "targets" plans no further test once the targets are met.
@@ -148,6 +134,6 @@ class PlanRequest:
     hours: float
     rig: RigSettings
     places: tuple[Place, ...]
-    grids: tuple[PredictionGrid, ...]
+    grids: Mapping[Place, tuple[Array, Array]]
     parameters: tuple[str, ...] = ()
     targets: Mapping[str, float] = field(default_factory=dict)

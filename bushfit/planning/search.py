@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import chain
 
 import numpy as np
 
@@ -94,7 +95,8 @@ class PlanSearch:
         )
         for index, rival in enumerate(knowledge.rivals):
             models.append(grid.information(rival, np.delete(residuals, index, axis=0) - residuals[index]))
-        predictions = [quantity for grid in request.grids for quantity in PlannedQuantity.predictions(knowledge, grid)]
+        of_places = [PlannedQuantity.predictions(knowledge, place, *grid) for place, grid in request.grids.items()]
+        predictions = list(chain(*of_places))
         named = {quantity.name: quantity for quantity in (*PlannedQuantity.parameters(knowledge), *predictions)}
         goals = [replace(named[name], target=half_width) for name, half_width in request.targets.items()]
         return cls(knowledge, request, tests, effects, models, predictions, goals, Budget.from_tests(tests, request))

@@ -10,7 +10,7 @@ from bushfit.effects.contract import Array
 from bushfit.fitting.preparation import planned_sweep
 from bushfit.geometry import Place
 from bushfit.model.covariance import Z95, Covariance
-from bushfit.planning.contract import Knowledge, PredictionGrid
+from bushfit.planning.contract import Knowledge
 from bushfit.planning.information import relative_slopes
 from bushfit.prediction.stiffness import Prediction, predict
 from bushfit.reading.measurement import loss_factor
@@ -60,19 +60,20 @@ class PlannedQuantity:
         return [cls(name, one, row[None], one, none, none) for name, row in pairs]
 
     @classmethod
-    def predictions(cls, knowledge: Knowledge, grid: PredictionGrid) -> list[PlannedQuantity]:
+    def predictions(cls, knowledge: Knowledge, place: Place, *grid: Array) -> list[PlannedQuantity]:
         """Stiffness and loss factor over a grid of operating points.
 
         Args:
             knowledge: model, covariance and noise before the planned tests.
-            grid: operating points of one direction.
+            place: direction or specimen.
+            *grid: frequencies [Hz] and zero-to-peak amplitudes [m, rad or strain].
 
         Returns:
             Planned stiffness, then planned loss factor.
         """
         exact = replace(knowledge.result, covariance=Covariance())
-        prediction = predict(exact, grid.place, grid.frequencies, grid.amplitudes)
-        points = grid.place, prediction.frequency, prediction.amplitude
+        prediction = predict(exact, place, *grid)
+        points = place, prediction.frequency, prediction.amplitude
         sweep = planned_sweep(knowledge.model, *points, (1.0, 1.0), (0.0, 0.0))
         gain, phase = np.split(relative_slopes(knowledge, [sweep]).T, 2)
         loss, one = loss_factor(knowledge.model.stiffness(*points)), np.ones(prediction.frequency.size)
@@ -83,7 +84,7 @@ class PlannedQuantity:
         ):
             half, error = np.maximum(band.high - band.value, band.value - band.low), np.linalg.norm(band.root, axis=0)
             errors = error / unit, np.maximum(half - Z95 * error, 0.0) / unit
-            quantities.append(cls(f"{name}.{grid.place}", value, rows, scale, *errors, prediction))
+            quantities.append(cls(f"{name}.{place}", value, rows, scale, *errors, prediction))
         return quantities
 
     @property

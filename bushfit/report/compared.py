@@ -50,11 +50,9 @@ def contrast_table(comparison: Comparison, contrast: Contrast) -> pd.DataFrame:
     (_, length), _, (_, factor) = contrast.place.display
     columns: list[Any] = [contrast.reference.frequency, contrast.reference.amplitude * length]
     for side in (contrast.reference, contrast.other):
-        for band, scale in ((side.stiffness, factor), (side.loss_factor, 1.0)):
-            columns += [scale * values for values in (band.value, band.low, band.high)]
+        columns += [*(factor * side.stiffness.ends), *side.loss_factor.ends]
     for band, convert in ((contrast.stiffness, relative_difference), (contrast.loss_factor, np.asarray)):
-        columns += [convert(values) for values in (band.value, band.low, band.high)]
-        columns.append(np.where(comparison.significant(band), "yes", "no"))
+        columns += [*convert(band.ends), np.where(comparison.significant(band), "yes", "no")]
     headers = contrast_headers(*response_headers(contrast.place)[:2])
     return pd.DataFrame(dict(zip(headers, columns, strict=True)))
 

@@ -16,7 +16,7 @@ import uuid
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -27,6 +27,7 @@ from bushfit.report import plots
 
 if TYPE_CHECKING:
     from bushfit.geometry import Place
+    from bushfit.report.plots.style import Chart
 
 #: File formats of a figure.
 Picture = Literal["png", "svg", "pdf"]
@@ -91,46 +92,32 @@ class Formats:
         """File name, with extension, of the table `name`."""
         return f"{name}.{ending(self.table_form)}"
 
-    def names(self, file: ResultFile) -> list[str]:
-        """Names of the files on disk that a result file is written to.
+    def encoders(self, file: ResultFile) -> dict[str, Callable[[Any], bytes]]:
+        """Names of the files on disk that a result file is written to, and functions that encode its content.
 
         Returns:
-            File names with extensions: one for each picture format of a figure; none if the kind is omitted.
+            Functions by file name with extension: one for each picture format of a figure; none if the kind is omitted.
         """
-        return {
-            "json": [f"{file.name}.json"],
-            "raw": [file.name],
-            "table": [self.table(file.name)] * self.tables,
-            "page": [f"{file.name}.html"] * self.pages,
-            "figure": [f"{file.name}.{form}" for form in self.picture_forms] * self.pictures,
-        }[file.kind]
 
-    def encode(self, file: ResultFile, content: Any) -> dict[str, bytes]:
-        """Encode the content of a result file as the bytes of its files on disk.
+        def draw(form: Picture, chart: Chart) -> bytes:
+            """Encode a figure; the module for it imports matplotlib, which is slow."""
+            return plots.style.to_image(chart, form)
 
-        Args:
-            file: result file of a kind that is not omitted.
-            content: its content.
-
-        Returns:
-            Bytes by file name with extension.
-
-        Raises:
-            OutputError: a table that is too large for its format.
-        """
-        if file.kind == "figure":
-            return {f"{file.name}.{form}": plots.style.to_image(content, form) for form in self.picture_forms}
-        if file.kind == "table":
-            content = to_bytes(file.name, content, self.table_form)
-        elif file.kind != "raw":
-            content = to_json(content) if file.kind == "json" else content.encode()
-        return {self.names(file)[0]: content}
+        name, tables = file.name, {self.table(file.name): partial(to_bytes, file.name, form=self.table_form)}
+        figures = {f"{name}.{form}": partial(draw, form) for form in self.picture_forms}
+        encoders: dict[Kind, Mapping[str, Callable[[Any], bytes]]] = {
+            "json": {f"{name}.json": to_json},
+            "raw": {name: bytes},
+            "table": tables if self.tables else {},
+            "page": {f"{name}.html": str.encode} if self.pages else {},
+            "figure": figures if self.pictures else {},
+        }
+        return dict(encoders[file.kind])
 
 
 def encode_all(files: Iterable[ResultFile], formats: Formats) -> dict[str, bytes]:
-    """Encode all files of a result: bytes by file name with extension."""
-    written = [file for file in files if formats.names(file)]
-    return {name: data for file in written for name, data in formats.encode(file, file.content()).items()}
+    """Encode all files of a result: bytes by file name with extension; a table that is too large is an OutputError."""
+    return {name: encode(file.content()) for file in files for name, encode in formats.encoders(file).items()}
 
 
 def to_json(document: Mapping[str, Any]) -> bytes:
@@ -165,12 +152,12 @@ def write_results(
         OutputError: the folder cannot be written, or holds a file that must not be replaced.
     """
     formats = formats or Formats()
-    written = [file for file in files if formats.names(file)]
+    written = [file for file in files if formats.encoders(file)]
     ordered = sorted(written, key=lambda file: _KINDS.index(file.kind))
-    names = [name for file in ordered for name in formats.names(file)]
+    names = [name for file in ordered for name in formats.encoders(file)]
     check_free(folder, names, overwrite=overwrite, inputs=inputs)
     for file in track("files made", ordered):
-        write_files(folder, formats.encode(file, file.content()))
+        write_files(folder, encode_all([file], formats))
     return names
 
 

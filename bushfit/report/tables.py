@@ -76,8 +76,7 @@ def band_columns(header: str, band: Band, factor: float = 1.0) -> dict[str, Arra
         band: quantity and band [SI].
         factor: factor from SI to the unit in the header.
     """
-    ends = {"": band.value, ", low": band.low, ", high": band.high}
-    return {f"{header}{end}": factor * values for end, values in ends.items()}
+    return dict(zip((header, f"{header}, low", f"{header}, high"), factor * band.ends, strict=True))
 
 
 def prediction_table(prediction: Prediction, display: Display | None = None) -> pd.DataFrame:
@@ -106,10 +105,10 @@ def prediction_table(prediction: Prediction, display: Display | None = None) -> 
         "frequency [Hz]": prediction.frequency,
         f"{motion_name} [{length}]": prediction.amplitude * length_factor,
     }
-    columns |= {name: getattr(prediction, key).value * scale for name, (key, scale) in quantities.items()}
-    for name, (key, scale) in quantities.items():
-        band = getattr(prediction, key)
-        columns |= {f"{name}, low": band.low * scale, f"{name}, high": band.high * scale}
+    bands = [band_columns(name, getattr(prediction, key), scale) for name, (key, scale) in quantities.items()]
+    columns |= {name: band[name] for name, band in zip(quantities, bands, strict=True)}
+    for band in bands:
+        columns |= band
     if rig := prediction.if_rigs:
         columns |= {f"{name}, {IF_RIGS}": getattr(rig, key).value * scale for name, (key, scale) in quantities.items()}
     if (measured := prediction.measured) is not None:

@@ -13,14 +13,14 @@ from bushfit.campaign.simulated import SimulatedLoop, SimulatedSweep
 from bushfit.effects.contract import Array
 from bushfit.fitting.preparation import MeasuredSweep, planned_loop, planned_sweep
 from bushfit.fitting.problem import FitProblem
-from bushfit.geometry import Bushing, Direction, Specimen
+from bushfit.geometry import Bushing, Direction, Place, Specimen
 from bushfit.model.covariance import Z95
 from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.planning.campaign import campaign_toml, simulation_settings
 from bushfit.planning.candidates import candidates
 from bushfit.planning.compound import gent_modulus, guess_parameters
-from bushfit.planning.contract import Aim, Knowledge, Noise, PlanRequest, PredictionGrid, Test, operating_points
+from bushfit.planning.contract import Aim, Knowledge, Noise, PlanRequest, Test, operating_points
 from bushfit.planning.information import CandidateGrid, ModelInformation, relative_slopes, rival_chi_squares
 from bushfit.planning.plan import Plan, plan
 from bushfit.planning.search import PlanSearch
@@ -39,9 +39,9 @@ SWEEPS = (
     SimulatedSweep(RADIAL, (5e-4,), BAND),
 )
 TESTS: tuple[Test, ...] = (*SWEEPS, SimulatedLoop(AXIAL, 1e-3, 0.1), SimulatedLoop(RADIAL, 2e-4, 1.0))
-GRIDS = tuple(PredictionGrid(place, np.array(BAND), np.array([1e-4, 2e-4, 5e-4])) for place in (AXIAL, RADIAL))
+GRIDS = dict.fromkeys((AXIAL, RADIAL), (np.array(BAND), np.array([1e-4, 2e-4, 5e-4])))
 RIG = RigSettings(gain_error=0.005, phase_error=0.0044, max_force=5e3, max_frequency=200.0)
-WANTED = PredictionGrid(AXIAL, np.array([10.0, 50.0, 150.0]), np.array([2e-4, 5e-4]))
+WANTED = {AXIAL: (np.array([10.0, 50.0, 150.0]), np.array([2e-4, 5e-4]))}
 BUSHING = Bushing("guessed", 0.010, 0.018, 0.034)
 #: Table 1 of Garcia Tarrago et al. 2007; the compound is that of its section 2: 61 Shore A, 27 phr, natural rubber.
 TABLE_1 = {"mu": 1.09e6, "m": 2e5, "alpha": 0.24, "sigma_fmax": 14.6e3, "eps_half": 0.013}
@@ -155,22 +155,22 @@ def test_a_plan_is_better_than_the_standard_programme_and_errors_before_are_thos
         assert tests[0] == tests[-1], "a session begins and ends with one test in each direction"
 
     # Of |K|, relative, and of the loss factor over the grid of a direction, by central differences.
-    def predicted(grid: PredictionGrid, name: str, factor: float) -> Array:
+    def predicted(place: Place, name: str, factor: float) -> Array:
         model = known.model.with_values({name: factor * known.model.values[name]})
-        k = model.stiffness(grid.place, np.tile(grid.frequencies, 3), np.repeat(grid.amplitudes, len(BAND)))
+        k = model.stiffness(place, np.tile(GRIDS[place][0], 3), np.repeat(GRIDS[place][1], len(BAND)))
         return np.array([np.log(np.abs(k)), k.imag / k.real])
 
     covariance = np.linalg.inv(known.precision)
-    for grid in GRIDS:
+    for place in GRIDS:
         slopes = np.array(
-            [(predicted(grid, name, 1.0 + 1e-4) - predicted(grid, name, 1.0 - 1e-4)) / 2e-4 for name in known.names]
+            [(predicted(place, name, 1.0 + 1e-4) - predicted(place, name, 1.0 - 1e-4)) / 2e-4 for name in known.names]
         )
         expected = np.sqrt(np.einsum("kcn,kl,lcn->cn", slopes, covariance, slopes))
-        told = [document[name][grid.place]["before"] for name in ("stiffness", "loss_factor")]
+        told = [document[name][place]["before"] for name in ("stiffness", "loss_factor")]
         np.testing.assert_allclose(told, np.sqrt(np.mean(expected**2, axis=1)), rtol=1e-3)
-        request = replace(wanted("predictions", 2.5), targets={f"loss_factor.{grid.place}": 0.05})
+        request = replace(wanted("predictions", 2.5), targets={f"loss_factor.{place}": 0.05})
         (goal,) = PlanSearch.from_request(known, request).goals
-        relative = 1.96 * expected[1] / predicted(grid, "mu", 1.0)[1]
+        relative = 1.96 * expected[1] / predicted(place, "mu", 1.0)[1]
         assert goal.half_width(covariance) == pytest.approx(relative.max(), rel=2e-3)
 
 
@@ -196,7 +196,7 @@ def test_simulated_campaigns_show_the_errors_promised(known):
     """
     truth, names = known.model, known.names
     vague = replace(known, covariance=100.0 * known.covariance, noise=Noise())
-    planned = plan(vague, PlanRequest("predictions", 0.7, RIG, (AXIAL,), (WANTED,), names))
+    planned = plan(vague, PlanRequest("predictions", 0.7, RIG, (AXIAL,), WANTED, names))
     settings = simulation_settings(planned.tests, vague.noise)
     clean = undisturbed(truth, settings)
     found = []

@@ -84,7 +84,7 @@ def band_at(band: Band, index: int, scale: float = 1.0) -> list[float]:
         index: index of the operating point.
         scale: factor from SI to the display unit.
     """
-    return [scale * float(end[index]) for end in (band.value, band.low, band.high)]
+    return [scale * end for end in band.ends[:, index].tolist()]
 
 
 def format_interval(values: Sequence[float], digits: int = 4) -> str:
