@@ -14,41 +14,16 @@ import click
 from bushfit.errors import BushfitError, OutputError, did_you_mean, printable
 from bushfit.version import __version__
 
-#: Commands by heading of `bushfit --help`, with their help lines. The command "fit-static" is `static` in the module
-#: fit, any other is `command` in the module of its name, which is imported when the command is called.
+#: Commands by heading of `bushfit --help`. The command "fit-static" is `static` in the module fit, any other is
+#: `command` in the module of its name, which is imported when the command is called.
 _GROUPS = {
-    "From tests to a result": {
-        "run": "The main job: fits, diagnosis and prediction in one go.",
-        "diagnose": "Where model and tests disagree, and which effect is missing.",
-        "predict": "Stiffness and loss factor of a model, as tables and plots.",
-        "respond": "Force over time for a displacement history, such as a road load.",
-        "compare": "Differences between results that exceed chance.",
-        "report": "One page from a folder of results, to show, print and mail.",
-        "batch": "Many campaigns at once: one table, limits, a report for CI.",
-    },
-    "Test files": {
-        "inspect": "How bushfit reads test files, and anything unusual in them.",
-        "init": "A campaign from test files and the geometry.",
-        "reduce": "A sweep from raw stepped-sine histories or a resonance test.",
-    },
-    "Single fits": {
-        "fit": "All five parameters from loops and sweeps: the fit to use.",
-        "fit-static": "mu, sigma_fmax and eps_half from the loops.",
-        "fit-dynamic": "m and alpha from the sweep of the smallest amplitude.",
-    },
-    "To learn bushfit": {
-        "example": "A simulated campaign to try bushfit on.",
-        "manual": "The manual in the browser, without a network.",
-    },
-    "Plans, simulations and exports": {
-        "plan": "The most informative next tests within your hours.",
-        "simulate": "A simulated campaign of tests from a model, with noise.",
-        "export": "Files for solvers, multibody codes and spreadsheets.",
-        "schema": "JSON Schemas of all files, for programs and editors.",
-    },
+    "From tests to a result": ("run", "diagnose", "predict", "respond", "compare", "report", "batch"),
+    "Test files": ("inspect", "init", "reduce"),
+    "Single fits": ("fit", "fit-static", "fit-dynamic"),
+    "To learn bushfit": ("example", "manual"),
+    "Plans, simulations and exports": ("plan", "simulate", "export", "schema"),
 }
 _COMMANDS = [name for commands in _GROUPS.values() for name in commands]
-
 #: Number of characters of the longest command name.
 _LONGEST = max(map(len, _COMMANDS))
 
@@ -79,10 +54,12 @@ class _Commands(click.Group):
         return getattr(importlib.import_module(f"bushfit.cli.{module}"), step or "command")
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write the commands with their help lines under the headings of the help."""
-        for heading, commands in _GROUPS.items():
+        """Write the commands with the first sentences of their helps under the headings of the help."""
+        for heading, names in _GROUPS.items():
+            commands = [self.get_command(ctx, name) for name in names]
+            helps = [command.get_short_help_str(_HELP_WIDTH) if command else "" for command in commands]
             with formatter.section(heading):
-                formatter.write_dl([(name.ljust(_LONGEST), line) for name, line in commands.items()])
+                formatter.write_dl([(name.ljust(_LONGEST), text) for name, text in zip(names, helps, strict=True)])
 
 
 @click.group(

@@ -11,7 +11,7 @@ from bushfit.cli.output import Output, with_output
 @command_called("example", "-o results/example")
 @with_output("bushfit-example", "tables")
 def command(output: Output) -> None:
-    """Write a campaign of the paper's bushing with simulated tests, to try bushfit without test files.
+    """Write a simulated campaign of the paper's bushing, to try bushfit without test files.
 
     Writes campaign.toml, the test files of a hysteresis loop and two sweeps, and truth.json (the simulated model).
     """

@@ -14,12 +14,6 @@ from bushfit.cli.shared_options import prediction_options, quantity, static_rate
 if TYPE_CHECKING:
     from bushfit.export.contract import UnitSystem
 
-#: File of each format, or dialect, that must not exist yet; an FMU is named after the bushing.
-_FILES = {
-    **{"nastran": "bushing.bdf", "optistruct": "bushing.fem", "abaqus": "bushing.inp", "adams": "bushing_car.bus"},
-    **{"prony": "prony.csv", "csv": "parameters.csv", "xlsx": "bushing.xlsx"},
-}
-
 
 def parse_units(text: str) -> UnitSystem:
     """Parse --units, such as "mm t s N"."""
@@ -100,12 +94,10 @@ def command(model: Path, formats: tuple[str, ...], campaign: Path | None, output
         raise click.UsageError("'--time-domain' requires '--format abaqus'.")
     comma = output.formats.table_form == "decimal-comma"
     names, file = tuple(dict.fromkeys(formats)), model_file(model)
-    written = [_FILES[dialect or name if name == "nastran" else name] for name in names if name in _FILES]
-    folder = output.folder((loaded or result).name, *written)
-    source = model_source(file)
     settings |= {"dialect": dialect or "nastran", "decimal_comma": comma}
     grid: Any = {key: settings.pop(key) for key in GridOptions.__annotations__}
-    document, files = export(result, source, names, loaded, grid, **settings)
+    document, files = export(result, model_source(file), names, loaded, grid, **settings)
+    folder = output.folder((loaded or result).name, *(part.name for part in files))
     limits = dict[str, list[str]]()
     for name, entry in document["formats"].items():
         for omission in entry["left_out"]:

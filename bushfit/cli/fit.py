@@ -88,9 +88,9 @@ def dynamic(
 @campaign_options
 @with_output("results/<campaign name>/fit", "tables", "pictures")
 def command(campaigns: tuple[Path, ...], max_nrmse: float | None, output: Output, **settings: Any) -> None:
-    """Fit all five parameters to the loops and sweeps of CAMPAIGN together.
+    """Fit all five parameters to the loops and sweeps of CAMPAIGN together: the fit to use.
 
-    Use this fit unless you need the two steps of the paper. It fits the axial tests, or the tests of all directions if
+    This fit replaces the two steps of the paper. It fits the axial tests, or the tests of all directions if
     axial loops or sweeps are missing. The other tests are predicted and shown. If [fit] of the campaign fixes all
     parameters (vary = false), the command reports how well these values agree with the tests. If the tests hardly
     determine a parameter, its standard error is misleading: use --profile.

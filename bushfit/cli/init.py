@@ -102,7 +102,6 @@ def command(files: tuple[Path, ...], name: str | None, no_input: bool, output: O
     if len({inspection.part for inspection in inspections if inspection.part}) > 1:
         target = target if output.output and output.output.suffix == ".toml" else "batch.toml"
         written = campaigns_of_parts(name, table, inspections, folder, target)
-        check_free(folder, list(written), overwrite=output.force)
     else:
         written = {target: campaign_text(name, table, inspections, folder)}
     if bushing:

@@ -28,7 +28,7 @@ _AGREED = 2
 @campaign_options
 @with_output("results/<campaign name>", "tables", "pictures", "pages")
 def command(campaigns: tuple[Path, ...], loss: Loss | None, max_nrmse: float | None, output: Output) -> None:
-    """Fit, diagnose and predict in one go.
+    """Fit, diagnose and predict in one go: the main command.
 
     Prints the verdict on the model, the parameters, the tested range, and the predicted stiffness at the lowest and
     highest frequency. -v prints every step. Steps for which tests are missing are skipped and listed.

@@ -14,7 +14,7 @@ from bushfit.cli.output import Output, with_output
 @click.argument("name", required=False)
 @with_output("nothing is written")
 def command(name: str | None, output: Output) -> None:
-    """Print the JSON Schema (draft 2020-12) of NAME on standard output; without NAME, list all names.
+    """Print the JSON Schema (draft 2020-12) of NAME; without NAME, list all names.
 
     A schema describes every key of a file and its unit. Programs that read results use the schemas of JSON files.
     TOML editors use the schemas of campaign, manifest and limits to complete and check keys while you type.

@@ -56,7 +56,7 @@ def exported_directions(request: ExportRequest) -> list[Prediction]:
         One prediction per direction, all on one list of frequencies [Hz].
 
     Raises:
-        ModelError: there is no direction, or the frequencies of the directions differ.
+        ModelError: there is no direction, or there are several bushings.
     """
     predictions = [prediction for prediction in request.predictions if prediction.direction.axis]
     if len(bodies := dict.fromkeys(prediction.direction.body for prediction in predictions)) > 1:
@@ -69,9 +69,6 @@ def exported_directions(request: ExportRequest) -> list[Prediction]:
             expected="axial, radial or torsion",
             hint="use the format csv or xlsx, which include specimens",
         )
-    grids = [np.unique(prediction.frequency) for prediction in predictions]
-    if not all(np.array_equal(grid, grids[0]) for grid in grids):
-        raise ModelError("directions at different frequencies", expected="one list of frequencies for all directions")
     return predictions
 
 

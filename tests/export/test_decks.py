@@ -217,7 +217,7 @@ def resting(model: Model, place: Direction, amplitude: float) -> float:
 
 
 @pytest.mark.parametrize("export", WRITERS)
-def test_every_deck_says_what_it_is_of_and_takes_directions_of_one_grid_alone(export, export_request):
+def test_every_deck_says_what_it_is_of_and_needs_a_direction(export, export_request):
     body = predict(export_request.result, Specimen("DMA =1+1", "modulus"), [5.0, 10.0], [0.01])
     exported = export(replace(export_request, units=MM_T_S_N, predictions=(body, *export_request.predictions)))
     assert "specimens: DMA =1+1" in exported.omissions
@@ -227,9 +227,6 @@ def test_every_deck_says_what_it_is_of_and_takes_directions_of_one_grid_alone(ex
             assert words in text, words
     with pytest.raises(ModelError, match="no direction of a bushing"):
         export(replace(export_request, predictions=(body,)))
-    other = predict(export_request.result, Direction.RADIAL, [5.0, 11.0], [1e-4])
-    with pytest.raises(ModelError, match="different frequencies"):
-        export(replace(export_request, predictions=(export_request.predictions[0], other)))
 
 
 @pytest.mark.parametrize(("name", "at_most"), [("nastran", 0.006), ("optistruct", 0.006), ("abaqus", 0.06)])
