@@ -16,6 +16,9 @@ _NEARER = 0.9
 _IDLE = 20
 #: Ratio of an iteration's error to the previous one, below which the next step is assumed to reach this ratio, too.
 _FAST = 0.1
+#: Largest error, relative to the force, of a start that is kept as the solution of the last of many models. A tiny
+#: compliance alone does not show that the start is a solution: the motion that it changes is as tiny.
+_SOLVED = 1e-6
 #: Number of past differences in Anderson mixing; chosen: three reduce the iterations to a third, more do not help.
 _REMEMBERED = 3
 
@@ -114,8 +117,9 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
         computed = below(history.with_value(motion, inner_solved)) - common
         if number == 0 and computed.ndim > imposed.ndim:  # many models, which start from the solution of the last
             shared = computed[-1] - estimate
-            is_small = np.max(np.abs(compliance)) * np.max(np.abs(shared)) <= history.accuracy * largest
-            common = shared * is_small
+            is_solved = np.max(np.abs(compliance)) * np.max(np.abs(shared)) <= history.accuracy * largest
+            is_solved &= np.max(np.abs(shared)) <= _SOLVED * np.max(np.abs(computed[-1]))
+            common = shared * is_solved
             computed = computed - common
         residual = computed - estimate
         error = np.max(np.abs(compliance * residual), axis=-1, keepdims=True)

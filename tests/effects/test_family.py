@@ -201,6 +201,19 @@ def test_sensitivities_match_finite_differences(effect, rng):
     assert worst < 2e-6
 
 
+def test_near_its_lower_limits_derivatives_are_about_the_force_of_the_model(effect, rng):
+    plain, model, direction, _, amplitude = drawn(rng, effect.name)
+    for key in model.values.keys() - plain.values.keys():
+        low = model.parameters[key].bounds[0]
+        if np.isfinite(low):
+            model = model.with_values({key: low + 1e-12 * scale(model.parameters[key], model.values[key])})
+    if not model.without_time_law:
+        names = [name for name in plain.values if name in model.values]
+        force, _ = force_and_slopes(model, direction, steady_sine(amplitude, 0.1), names)
+        expected = model.force(direction, steady_sine(amplitude, 0.1), kind="loop")
+        np.testing.assert_allclose(force, expected, atol=1e-6 * np.max(np.abs(expected)))
+
+
 def test_twins_answer_alike_in_both_faces_and_only_the_bushings_is_proposed(rng):
     sets = [twins_of(name) for name, each in LIBRARY.items() if each.twins]
     assert len(sets) == 5
