@@ -53,6 +53,7 @@ class FaultyPart(Explanation):
             smallest or largest level of a direction, a loop that no other test covers, or frequencies in all directions
             at every amplitude.
         is_scattered: True if each point has an independent error; False for a common shift or slope.
+        amount: prior standard deviation of each error, relative to |K|; 0 before the fault is part of an explanation.
     """
 
     direction: Place
@@ -60,6 +61,7 @@ class FaultyPart(Explanation):
     amplitude: tuple[float, float]
     may_be_physics: bool = field(default=False, kw_only=True)
     is_scattered: bool = field(default=False, kw_only=True)
+    amount: float = field(default=0.0, kw_only=True)
 
     @property
     def columns(self) -> Array:

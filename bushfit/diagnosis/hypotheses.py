@@ -102,57 +102,53 @@ class SearchState:
     Args:
         tests: tests with their record, as read or corrected.
         fit: fit of the model with the added effects; faults and a deviation of the compound may be errors in it.
-        log_prior: natural log of the prior probability of the set of explanations.
+        bare: this fit with residuals in units of the scatter from point to point, without errors that points share.
+        log_prior: natural log of the prior probability of the set of explanations, and of the prior density of the
+            effects' coordinates with the factor of Laplace's method.
         effects: names of the effects that were added.
         faulty_parts: faulty parts of the tests, whose points may deviate together.
         precision: prior precision (inverse variance) by fitting coordinate of the effects; infinite for a shape
             parameter at an end of its range.
-        log_density: natural log of the prior density of these coordinates, with the factor of Laplace's method.
-        amounts: prior standard deviation of each faulty part's deviation, relative to |K|.
         change: largest relative change of |K| due to the effects and faulty parts.
     """
 
     tests: RecordedTests
     fit: FitResult
+    bare: FitResult
     log_prior: float
     effects: tuple[str, ...] = ()
     faulty_parts: tuple[FaultyPart, ...] = ()
     precision: Mapping[str, float] = field(default_factory=dict)
-    log_density: float = 0.0
-    amounts: tuple[float, ...] = ()
     change: float = 0.0
 
     @classmethod
     def of_tests(cls, tests: RecordedTests) -> SearchState:
         """Create the initial state of a search: the starting model with nothing added."""
-        return cls(tests, tests.base, tests.log_prior, change=tests.change)
+        return cls(tests, tests.base, tests.bare, tests.log_prior, change=tests.change)
 
-    def with_effect(self, name: str, fit: FitResult, log_odds: float) -> SearchState:
-        """Add an effect to this step of the search.
+    def with_fit(self, fit: FitResult) -> SearchState:
+        """Replace the fit by another fit of the same model, whose effects have the same prior."""
+        return replace(self, fit=fit, bare=fit.reevaluate(fit.model, self.tests.bare.data_sets))
+
+    def with_effect(self, name: str, log_odds: float, before: FitResult) -> SearchState:
+        """Add an effect that the fit of this state has already.
 
         Args:
             name: name of the effect.
-            fit: fit with the effect.
             log_odds: natural log of the prior odds of the effect.
+            before: fit without the effect.
 
         Returns:
-            State with the effect, the fit, and the prior of the effect's parameters.
+            State with the effect and the prior of the effect's parameters.
         """
-        log_density, precision, change = laplace(name, fit, self.fit)
+        log_density, precision, change = laplace(name, self.fit, before)
         return replace(
             self,
             effects=(*self.effects, name),
-            fit=fit,
-            log_prior=self.log_prior + log_odds,
+            log_prior=self.log_prior + log_odds + log_density,
             precision={**self.precision, **precision},
-            log_density=self.log_density + log_density,
             change=max(self.change, change),
         )
-
-    @cached_property
-    def bare(self) -> FitResult:
-        """The fit with residuals in units of the scatter from point to point, without errors that points share."""
-        return self.fit.reevaluate(self.fit.model, self.tests.bare.data_sets)
 
     @cached_property
     def plain(self) -> FitResult:
@@ -162,7 +158,8 @@ class SearchState:
     @cached_property
     def key(self) -> frozenset[Hashable]:
         """Names that identify this search state: effects, faulty parts of the tests, and corrected mistake."""
-        return self.hypotheses[0].key
+        claims = [self.tests.claim.key] if self.tests.claim else []
+        return frozenset((*self.effects, *(part.name for part in self.faulty_parts), *claims))
 
     @cached_property
     def has_influence(self) -> Array:
@@ -177,17 +174,17 @@ class SearchState:
     def linear(self) -> LinearModel:
         """Residuals linearised at the fit, from which the evidence is computed for each noise case of the rig."""
         bare, moves, columns = self.bare, self.has_influence, self.columns
-        precision = np.array([self.precision.get(name, 0.0) for name in bare.names])
-        common = [(p, x) for p, x in zip(self.faulty_parts, self.amounts, strict=True) if not p.is_scattered]
-        rows = np.concatenate([bare.jacobian[moves], *(part.columns for part, _ in common)])
-        precision = np.concatenate([precision[moves], *(np.full(len(part.columns), x**-2) for part, x in common)])
+        precision = np.array([self.precision.get(name, 0.0) for name in bare.names])[moves]
+        common = [part for part in self.faulty_parts if not part.is_scattered]
+        rows = np.concatenate([bare.jacobian[moves], *(part.columns for part in common)])
+        precision = np.concatenate([precision, *(np.full(len(part.columns), part.amount**-2) for part in common)])
         return LinearModel(bare.residual, rows, precision, columns.errors, columns.compound)
 
     @cached_property
     def columns(self) -> ExplanationColumns:
         """Further explanations beside the errors of the rig and of faulty parts whose points deviate independently."""
-        pairs = zip(self.faulty_parts, self.amounts, strict=True)
-        variances = [x**2 * np.square(part.columns).sum(axis=0) for part, x in pairs if part.is_scattered]
+        scattered = [part.amount * part.columns for part in self.faulty_parts if part.is_scattered]
+        variances = [np.square(columns).sum(axis=0) for columns in scattered]
         return self.tests.columns.with_variance(np.sum(variances, axis=0)) if variances else self.tests.columns
 
     @property
@@ -210,7 +207,7 @@ class SearchState:
         of_rubber = [name not in self.precision or name in replacing for name in self.bare.names]
         volume = np.linalg.svd(self.bare.jacobian[of_rubber], compute_uv=False)
         count = len(self.tests.base.names)
-        return self.log_prior + self.log_density + float(np.sum(np.log(np.maximum(volume[:count], 1e-12))))
+        return self.log_prior + float(np.sum(np.log(np.maximum(volume[:count], 1e-12))))
 
     @property
     def likeliest_deviation(self) -> float:
@@ -230,10 +227,9 @@ class SearchState:
             Change of the whitened residuals per standard deviation, (c, n); None without faulty parts and deviation.
         """
         columns = []
-        for part, amount in zip(self.faulty_parts, self.amounts, strict=True):
+        for part in self.faulty_parts:
             fitted = self.tests.faulty_parts_in_fits[part.name]
-            fitted = fitted.point_by_point() if part.is_scattered else fitted
-            columns.append(amount * fitted.columns)
+            columns.append(part.amount * (fitted.point_by_point() if part.is_scattered else fitted).columns)
         compound = self.tests.compound_in_fits if deviation else None
         columns += [deviation * compound.whole] if compound else []
         return np.concatenate(columns) if columns else None

@@ -7,7 +7,7 @@ without a name comes from a linear model.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Hashable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -33,6 +33,7 @@ from bushfit.errors import FitError, ModelError
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.problem import FitResult
 from bushfit.geometry import stiffness_per_modulus
+from bushfit.model.model import Model
 from bushfit.progress import track
 
 #: Maximum number of refits of hypotheses that are probable by the linear model alone; for time.
@@ -218,7 +219,8 @@ class Search:
         for deviation in dict.fromkeys((state.likeliest_deviation, 0.0)):
             columns = state.free_columns(deviation)
             for name, fit in self._fit_rivals(models, state.fit.data_sets, start, columns=columns).items():
-                candidate = self._visit(state.with_effect(name, fit, self._log_odds("effect", name, depth)))
+                log_odds = self._log_odds("effect", name, depth)
+                candidate = self._visit(state.with_fit(fit).with_effect(name, log_odds, state.fit))
                 if name not in grown or candidate.log_posterior > grown[name].log_posterior:
                     grown[name] = candidate
         return list(grown.values())
@@ -233,29 +235,44 @@ class Search:
         faulty_parts = [(e, evidence) for e, evidence in state.explanation_evidence if isinstance(e, FaultyPart)]
         faulty_parts.sort(key=lambda pair: -(self._log_odds("part", pair[0].name, depth) + pair[1].total))
         for part, shifted in faulty_parts[:_FAULTY_PARTS]:
-            better, worth = part, shifted
+            better, evidence = part, shifted
             if part.family != "loop":
-                scattered_part = part.point_by_point()
-                groups = GroupSet([scattered_part.group], state.columns.errors)  # type: ignore[list-item]
-                (scattered,) = state.weigh([groups])
-                better, worth = (scattered_part, scattered) if scattered.total > shifted.total else (part, shifted)
+                scattered = part.point_by_point()
+                groups = GroupSet([scattered.group], state.columns.errors)  # type: ignore[list-item]
+                (of_points,) = state.weigh([groups])
+                if of_points.total > shifted.total:
+                    better, evidence = scattered, of_points
             log_odds = self._log_odds("part", part.name, depth)
-            improves = state.log_weight + log_odds + worth.total > state.log_posterior
+            improves = state.log_weight + log_odds + evidence.total > state.log_posterior
             if not improves or state.key | {part.name} in self._visited:
                 continue
             grown = replace(
                 state,
-                faulty_parts=(*state.faulty_parts, better),
+                faulty_parts=(*state.faulty_parts, replace(better, amount=evidence.likeliest)),
                 log_prior=state.log_prior + log_odds,
-                amounts=(*state.amounts, worth.likeliest),
-                change=max(state.change, worth.size),
+                change=max(state.change, evidence.size),
             )
-            if grown.plain.reduced_chi_square > _BENT:  # perhaps by the part
-                models, columns, fits = {"": grown.fit.model}, grown.free_columns(0.0), list[FitResult]()
-                for start in [{}] if grown.effects else [{}, self.start]:
-                    fits += self._fit_rivals(models, grown.fit.data_sets, start, columns=columns).values()
-                grown = replace(grown, fit=min(fits, key=lambda fit: fit.chi_square, default=grown.fit))
+            if state.plain.reduced_chi_square > _BENT:  # perhaps by the part
+                starts = [{}] if state.effects else [{}, self.start]
+                fits = [fit for start in starts for fit in self._refits(grown, grown.fit.model, start)]
+                grown = grown.with_fit(min(fits, key=lambda fit: fit.chi_square)) if fits else grown
             yield self._visit(grown)
+
+    def _refits(
+        self, state: SearchState, model: Model, start: Mapping[str, float], deviation: float = 0.0
+    ) -> Collection[FitResult]:
+        """Fit one model to the tests of a state, with its faulty parts left free.
+
+        Args:
+            state: state with the tests and faulty parts.
+            model: model at its starting values.
+            start: further starting values, by parameter.
+            deviation: standard deviation of the compound's deviation that is left free, relative to |K|.
+
+        Returns:
+            The fit; nothing without a response.
+        """
+        return self._fit_rivals({"": model}, state.fit.data_sets, start, columns=state.free_columns(deviation)).values()
 
     def _without_earlier(self, state: SearchState) -> Iterator[SearchState]:
         """Yield for each earlier effect, which the last may make unnecessary, the refitted state without it."""
@@ -264,7 +281,7 @@ class Search:
         for name, model in shorter.items():
             if state.key - {name} in self._visited or not all(has_used_parameters(e, model) for e in model.records):
                 continue
-            for fit in self._fit_rivals({name: model}, state.fit.data_sets, {}).values():
+            for fit in self._refits(state, model, {}):
                 yield self._visit(self._with_fit(state, [e for e in state.effects if e != name], fit))
 
     def _with_fit(self, state: SearchState, effects: Sequence[str], fit: FitResult) -> SearchState:
@@ -275,9 +292,9 @@ class Search:
             effects: names of the effects, added one after the other.
             fit: fit with all effects.
         """
-        fitted = replace(SearchState.of_tests(state.tests), fit=fit)
+        fitted = SearchState.of_tests(state.tests).with_fit(fit)
         for order, name in enumerate(effects):
-            fitted = fitted.with_effect(name, fit, self._log_odds("effect", name, order))
+            fitted = fitted.with_effect(name, self._log_odds("effect", name, order), fit)
         return fitted
 
     def _with_common_start(self, states: list[SearchState]) -> list[SearchState]:
@@ -297,8 +314,7 @@ class Search:
         near.sort(key=lambda n: -states[n].log_posterior)
         for n in near[:_RIVALS] if leader.likeliest_deviation and not leader.faulty_parts else ():
             state, start = states[n], leader.fit.model.values
-            models, columns = {"": state.fit.model}, state.free_columns(leader.likeliest_deviation)
-            for fit in self._fit_rivals(models, state.fit.data_sets, start, columns=columns).values():
+            for fit in self._refits(state, state.fit.model, start, leader.likeliest_deviation):
                 candidate = self._visit(self._with_fit(state, state.effects, fit))
                 states[n] = max(state, candidate, key=lambda rival: rival.log_posterior)
         return states
