@@ -112,7 +112,7 @@ def list_candidates(
             gain = base.chi_square - hypothesis.state.plain.chi_square
             why = "closes the gap" if first and first.best is hypothesis else _LESS_LIKELY
             candidates.append(CandidateResult(" + ".join(claim.labels), gain, gain, share, {}, why))
-    for proposal in search.root.proposals:
+    for proposal in search.proposals:
         name, after = proposal.name, alone.get(proposal.name)
         if after is None:
             why = "score too small to refit" if proposal.visible else "not visible in these tests"

@@ -15,7 +15,6 @@ from bushfit.diagnosis.laplace import laplace
 from bushfit.diagnosis.linear_model import GroupEvidence, LinearModel
 from bushfit.diagnosis.priors import LEVELS
 from bushfit.diagnosis.projected_columns import CompoundDeviation, GroupSet
-from bushfit.diagnosis.propose import Proposal, proposals
 from bushfit.diagnosis.recorded_tests import ExplanationColumns, RecordedTests
 from bushfit.diagnosis.smooth_deviations import COMPOUND, compound, fast_relaxation
 from bushfit.effects import get_effect, get_parameter, qualified_name
@@ -252,24 +251,6 @@ class SearchState:
         means = {name: float(np.clip(values[name] + x, *get_parameter(name).bounds)) for name, x in steps.items()}
         fitted = Covariance(names, covariance[:count, :count] * np.outer(slopes, slopes))
         return means, fitted.restricted([name for name in names if name not in bare.at_bound])
-
-    @property
-    def may_grow(self) -> bool:
-        """True if the search may add a further effect to this state."""
-        return len(self.effects) < self.tests.max_effects
-
-    @cached_property
-    def proposals(self) -> list[Proposal]:
-        """Effects of the library that the model lacks, ranked by expected decrease of chi-square."""
-        return proposals(self.bare, (*self.tests.without, *self.effects), self.tests.base.fixed)
-
-    @cached_property
-    def explanation_evidence(self) -> list[tuple[Explanation, GroupEvidence]]:
-        """Further explanations of the gap, each with the evidence of the tests for it in the linearised model."""
-        columns, effects = self.columns, [e for e in self.proposals if e.group] if self.may_grow else []
-        sets = GroupSet.split([e.group for e in effects if e.group], columns.errors)
-        evidence = self.weigh([*sets, *columns.sets])
-        return list(zip([*effects, *columns.explanations], evidence, strict=True))
 
     def weigh(self, sets: Sequence[GroupSet]) -> list[GroupEvidence]:
         """Evidence of the tests for sets of explanations, averaged over the likely sizes of the rig's errors.

@@ -6,16 +6,22 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
+import numpy as np
+
 from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.claims import Claim
 from bushfit.diagnosis.explanations import Explanation, Group
 from bushfit.diagnosis.faulty_parts import FaultyPart, find_faulty_parts
 from bushfit.diagnosis.projected_columns import CompoundDeviation, GroupSet
-from bushfit.diagnosis.record import DiagnosisSettings
 from bushfit.diagnosis.rig_errors import RigErrors, in_scatter_units, rig_errors
 from bushfit.diagnosis.smooth_deviations import compound, unnamed_curves
 from bushfit.effects.contract import Array
+from bushfit.effects.mistakes import USUAL_MODULUS
 from bushfit.fitting.problem import FitResult
+from bushfit.geometry import stiffness_per_modulus
+
+#: Attributes of a test that a record determines at each point.
+_RECORDED = ("measured", "amplitude", "frequency")
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,35 +67,32 @@ class RecordedTests:
 
     Args:
         base: fit of the starting model; its residuals are whitened by scatter and by errors that points share.
+        bare: this fit with residuals in units of the scatter from point to point, to compare hypotheses; errors that
+            points share are not part of this unit.
+        columns: explanations that do not depend on effects, beside the compound's deviation and the errors of the rig.
         rig: stated accuracy class of the rig (gain and phase errors).
-        without: names of effects not to consider.
         log_prior: natural log of the prior probability that this record is right and nothing is missing.
         claim: mistake that is corrected; None for the tests as recorded.
         change: relative change of the recorded quantities due to the correction; 0 for the tests as recorded.
-        max_effects: maximum number of effects of an explanation.
     """
 
     base: FitResult
+    bare: FitResult
+    columns: ExplanationColumns
     rig: RigSettings
-    without: Sequence[str]
     log_prior: float
     claim: Claim | None = None
     change: float = 0.0
-    max_effects: int = DiagnosisSettings.max_effects
 
-    @cached_property
-    def bare(self) -> FitResult:
-        """Fit of the starting model with residuals in units of the scatter from point to point, to compare hypotheses.
-
-        Errors that points share are not part of this unit; `columns.errors` describes them.
-        """
-        return in_scatter_units(self.base)
-
-    @cached_property
-    def columns(self) -> ExplanationColumns:
-        """Explanations that do not depend on effects, beside the compound's deviation and the errors of the rig."""
-        explanations, group = [*find_faulty_parts(self.bare), *unnamed_curves(self.bare)], compound(self.bare)
-        return ExplanationColumns(explanations, group, rig_errors(self.bare, self.rig))
+    @classmethod
+    def of_fit(
+        cls, base: FitResult, rig: RigSettings, log_prior: float, claim: Claim | None = None, change: float = 0.0
+    ) -> RecordedTests:
+        """Build the tests from a fit of the starting model; see the class for the arguments."""
+        bare = in_scatter_units(base)
+        explanations = [*find_faulty_parts(bare), *unnamed_curves(bare)]
+        columns = ExplanationColumns(explanations, compound(bare), rig_errors(bare, rig))
+        return cls(base, bare, columns, rig, log_prior, claim, change)
 
     @cached_property
     def compound_in_fits(self) -> Group | None:
@@ -103,3 +106,31 @@ class RecordedTests:
     def faulty_parts_in_fits(self) -> dict[str, FaultyPart]:
         """Faulty parts by name; their changes of the residuals are whitened as in a fit, not in units of scatter."""
         return {part.name: part for part in find_faulty_parts(self.base)}
+
+
+def modulus_deviation(fit: FitResult) -> float:
+    """Deviation of the median shear modulus of the tests from that of bushing rubber, in standard deviations."""
+    moduli = [
+        np.median(np.abs(test.measured)) / stiffness_per_modulus(fit.model.bushing, test.direction)
+        for test in fit.data_sets
+    ]
+    typical, spread = USUAL_MODULUS
+    return float(np.log(np.median(moduli) / typical)) / spread
+
+
+def record_change(base: FitResult, corrected: FitResult) -> float:
+    """Largest relative change of a recorded stiffness (complex), amplitude or frequency in a correction of the record.
+
+    The value is 1 if the dimensions of the bushing or the direction of a test are corrected.
+
+    Args:
+        base: fit to the tests as recorded.
+        corrected: fit to the corrected tests.
+    """
+    pairs = list(zip(base.data_sets, corrected.data_sets, strict=True))
+    if base.model.bushing != corrected.model.bushing or any(
+        before.direction != after.direction for before, after in pairs
+    ):
+        return 1.0
+    recorded = [(getattr(before, name), getattr(after, name)) for before, after in pairs for name in _RECORDED]
+    return max(float(np.max(np.abs(after / before - 1.0))) for before, after in recorded)

@@ -369,7 +369,7 @@ class DiagnosisWriter:
 
     def _notes(self) -> list[str]:
         """Sentences on the effects and kinds of fault that these tests cannot show."""
-        unseen = [proposal.name for proposal in self.search.root.proposals if not proposal.visible]
+        unseen = [proposal.name for proposal in self.search.proposals if not proposal.visible]
         unseen = [name for name in unseen if not get_effect(name).depends_on]  # not those that need a stated condition
         notes = [f"not identifiable from these tests: {', '.join(unseen)}"] if unseen else []
         directions = {str(test.direction) for test in self.search.base.data_sets}

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import product
 from math import log
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,18 +22,18 @@ from bushfit.diagnosis.explanations import Explanation
 from bushfit.diagnosis.faulty_parts import FaultyPart, OutlierCluster
 from bushfit.diagnosis.fits import fit_rivals
 from bushfit.diagnosis.hypotheses import Hypothesis, SearchState
+from bushfit.diagnosis.linear_model import GroupEvidence
 from bushfit.diagnosis.priors import BEAM, DOES_NOT_FIT, LOG_ODDS_CUTOFF, NAMED, ODDS, REFITS, ROUNDS
 from bushfit.diagnosis.projected_columns import GroupSet
-from bushfit.diagnosis.propose import has_used_parameters
+from bushfit.diagnosis.propose import Proposal, has_used_parameters, proposals
 from bushfit.diagnosis.record import DiagnosisSettings
-from bushfit.diagnosis.recorded_tests import RecordedTests
+from bushfit.diagnosis.recorded_tests import RecordedTests, modulus_deviation, record_change
 from bushfit.diagnosis.smooth_deviations import COMPOUND
 from bushfit.diagnosis.verdict import decide_verdict
-from bushfit.effects.mistakes import USUAL_MODULUS, get_mistake
+from bushfit.effects.mistakes import get_mistake
 from bushfit.errors import FitError, ModelError
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.problem import FitResult
-from bushfit.geometry import stiffness_per_modulus
 from bushfit.model.model import Model
 from bushfit.progress import track
 
@@ -44,10 +45,22 @@ _CLAIMS, _FAULTY_PARTS = 4, 2
 _SLIGHT = 3.0
 #: Number of rivals that are refitted from the values of the most probable state in each round; for time.
 _RIVALS = 6
-#: Attributes of a test that a record determines at each point.
-_RECORDED = ("measured", "amplitude", "frequency")
 #: Reduced chi-square above which the gap has distorted the parameters too much to start a refit from their values.
 _BENT = 1.5
+
+
+class _Step(NamedTuple):
+    """State of the search to extend.
+
+    Args:
+        state: the state.
+        effects: effects that may be added, the highest score first.
+        evidence: further explanations of the gap, each with the evidence of the tests for it in the linear model.
+    """
+
+    state: SearchState
+    effects: Sequence[Proposal]
+    evidence: Sequence[tuple[Explanation, GroupEvidence]]
 
 
 @dataclass(eq=False)
@@ -77,12 +90,13 @@ class Search:
     def __post_init__(self) -> None:
         settings = self.settings
         adopted = sum(get_mistake(name) is None for name in settings.adopt)
-        limit = max(settings.max_effects - adopted, min(settings.max_effects, 1))
+        self._most_effects = max(settings.max_effects - adopted, min(settings.max_effects, 1))
         log_prior = log(1.0 - sum(ODDS.values()))
-        tests = RecordedTests(self.base, self.data.campaign.rig, settings.without, log_prior, max_effects=limit)
+        tests = RecordedTests.of_fit(self.base, self.data.campaign.rig, log_prior)
         self.root = SearchState.of_tests(tests)
+        self.proposals = proposals(tests.bare, settings.without, self.base.fixed)
         self._fit_rivals = partial(fit_rivals, fixed=self.base.fixed, bounds=self.data.bounds)
-        self._log_priors = prior_odds([*self.root.proposals, *tests.columns.explanations])
+        self._log_priors = prior_odds([*self.proposals, *tests.columns.explanations])
         families = {e.family for e in (*self.outlier_clusters, *tests.columns.explanations) if e.kind == "part"}
         self._meeting_odds = log(ODDS["part"] / max(len(families), 1)) - tests.log_prior
 
@@ -94,18 +108,27 @@ class Search:
         """
         beam = [self._visit(self.root)]
         for depth in range(ROUNDS + 1):
+            steps = list[_Step]()
             for state in track(f"round {depth + 1} of at most {ROUNDS + 1}", beam):
-                for explanation, evidence in state.explanation_evidence:
+                effects = list[Proposal]()
+                if len(state.effects) < self._most_effects:
+                    excluded = (*self.settings.without, *state.effects)
+                    is_root = state is self.root
+                    effects = self.proposals if is_root else proposals(state.bare, excluded, self.base.fixed)
+                groups = [effect.group for effect in effects if effect.group]
+                evidence = state.weigh([*GroupSet.split(groups, state.columns.errors), *state.columns.sets])
+                explanations = [*(effect for effect in effects if effect.group), *state.columns.explanations]
+                steps.append(_Step(state, effects, list(zip(explanations, evidence, strict=True))))
+                for explanation, of_explanation in steps[-1].evidence:
                     log_odds = self._log_odds(explanation.kind, explanation.name, depth)
-                    self._note(state.extended(evidence, explanation, log_odds))
+                    self._note(state.extended(of_explanation, explanation, log_odds))
             if depth == ROUNDS or self._is_sure():
                 break
             fresh = list[SearchState]()
-            for state in track("with one more", beam):
-                by_evidence, by_score = REFITS[1 if depth else 2 if state.plain.reduced_chi_square > _BENT else 0]
-                for grown in self._with_effects(state, self._promising(state, by_evidence, by_score), depth):
+            for step in track("with one more", steps):
+                for grown in self._with_effects(step.state, self._promising(step, depth), depth):
                     fresh += [grown, *self._without_earlier(grown)]
-                fresh += self._with_faulty_parts(state, depth)
+                fresh += self._with_faulty_parts(step, depth)
             fresh = self._with_common_start([*beam, *fresh])[len(beam) :]
             if depth == 0:
                 fresh += self._corrected_records()
@@ -137,9 +160,9 @@ class Search:
             ahead = (np.cumsum(share) - share) / share.sum()
             candidates = zip(ordered, ahead.tolist(), strict=True)
             linear = next((h for h, before in candidates if before < NAMED and not h.refitted), None)
-            if linear is None:
+            if linear is None or not isinstance(linear.last, Proposal):
                 return
-            if not self._with_effects(linear.state, [linear.effects[-1]], len(linear.state.key)):
+            if not self._with_effects(linear.state, [linear.last], len(linear.state.key)):
                 del self._known[linear.key]  # no response with it, or far behind
 
     def _log_odds(self, kind: str, name: str, depth: int) -> float:
@@ -179,41 +202,41 @@ class Search:
             if before is None or rank > (before.refitted, before.log_posterior):
                 self._known[candidate.key] = candidate
 
-    def _promising(self, state: SearchState, by_evidence: int, by_score: int) -> list[str]:
+    def _promising(self, step: _Step, depth: int) -> list[Proposal]:
         """Select the effects to refit as additions to a state of the search.
 
-        Args:
-            state: state that the effects are added to.
-            by_evidence: number of effects with the highest evidence in the linear model.
-            by_score: number of effects with the largest expected decrease of chi-square, a better criterion for large
-                gaps.
-        """
-        scores = {p.name: p.score for p in state.proposals if state.key | {p.name} not in self._visited}
-        prior = {name: self._log_odds("effect", name, 0) for name in scores}
-        base = state.log_weight - state.log_posterior
-        gains = {
-            e.name: base + prior[e.name] + evidence.total
-            for e, evidence in state.explanation_evidence
-            if e.kind == "effect" and e.name in scores
-        }
-        first = sorted(gains, key=lambda name: -gains[name])[:by_evidence]
-        second = [name for name, score in scores.items() if 0.5 * score + prior[name] > -_SLIGHT][:by_score]
-        return list(dict.fromkeys([*(name for name in first if gains[name] > -_SLIGHT), *second]))
+        These have the highest evidence in the linear model, or the largest expected decrease of chi-square, a better
+        criterion for large gaps.
 
-    def _with_effects(self, state: SearchState, names: Sequence[str], depth: int) -> list[SearchState]:
-        """Extend a state of the search by each of the named effects, refitted with all parameters.
+        Args:
+            step: state that the effects are added to, with the evidence for them.
+            depth: number of explanations in the state.
+        """
+        state = step.state
+        by_evidence, by_score = REFITS[1 if depth else 2 if state.plain.reduced_chi_square > _BENT else 0]
+        effects = [effect for effect in step.effects if state.key | {effect.name} not in self._visited]
+        prior = {effect.name: self._log_odds("effect", effect.name, 0) for effect in effects}
+        base = state.log_weight - state.log_posterior
+        gains = {e.name: base + prior[e.name] + evidence.total for e, evidence in step.evidence if e.name in prior}
+        first = sorted((effect for effect in effects if effect.group), key=lambda effect: -gains[effect.name])
+        first = [effect for effect in first[:by_evidence] if gains[effect.name] > -_SLIGHT]
+        second = [effect for effect in effects if 0.5 * effect.score + prior[effect.name] > -_SLIGHT][:by_score]
+        return list(dict.fromkeys([*first, *second]))
+
+    def _with_effects(self, state: SearchState, effects: Sequence[Proposal], depth: int) -> list[SearchState]:
+        """Extend a state of the search by each of several effects, refitted with all parameters.
 
         Each effect is refitted with the compound's likeliest deviation left free and without a deviation, because each
         hypothesis is weighed around its own fit; the search goes on from the more probable fit.
 
         Args:
             state: fitted model with some explanations.
-            names: names of the effects to add, one at a time.
+            effects: effects to add, one at a time.
             depth: number of explanations in the state.
         """
-        if not names or not state.may_grow:
+        if not effects:
             return []
-        models = {proposal.name: proposal.model for proposal in state.proposals if proposal.name in names}
+        models = {effect.name: effect.model for effect in effects}
         start = self.start if not state.effects and state.plain.reduced_chi_square > _BENT else {}
         grown: dict[str, SearchState] = {}
         for deviation in dict.fromkeys((state.likeliest_deviation, 0.0)):
@@ -225,14 +248,15 @@ class Search:
                     grown[name] = candidate
         return list(grown.values())
 
-    def _with_faulty_parts(self, state: SearchState, depth: int) -> Iterator[SearchState]:
+    def _with_faulty_parts(self, step: _Step, depth: int) -> Iterator[SearchState]:
         """Extend a state by each of its likeliest faulty parts of the tests, with a common shift or an error per point.
 
         Args:
-            state: state to extend.
+            step: state to extend, with the evidence for faulty parts.
             depth: number of explanations that the state has.
         """
-        faulty_parts = [(e, evidence) for e, evidence in state.explanation_evidence if isinstance(e, FaultyPart)]
+        state = step.state
+        faulty_parts = [(part, evidence) for part, evidence in step.evidence if isinstance(part, FaultyPart)]
         faulty_parts.sort(key=lambda pair: -(self._log_odds("part", pair[0].name, depth) + pair[1].total))
         for part, shifted in faulty_parts[:_FAULTY_PARTS]:
             better, evidence = part, shifted
@@ -326,38 +350,10 @@ class Search:
             with suppress(FitError, ModelError):  # corrected tests that nothing can be fitted to
                 fit = self.fit_corrected(claim.corrected())
                 if [test.size for test in fit.data_sets] == [test.size for test in self.base.data_sets]:
-                    odds = log(ODDS["record"]) - log(len(possible)) - 0.5 * _modulus_deviation(fit) ** 2
-                    change = _record_change(self.base, fit)
-                    tests = replace(self.root.tests, base=fit, log_prior=odds, claim=claim, change=change)
+                    odds = log(ODDS["record"]) - log(len(possible)) - 0.5 * modulus_deviation(fit) ** 2
+                    change = record_change(self.base, fit)
+                    tests = RecordedTests.of_fit(fit, self.data.campaign.rig, odds, claim, change)
                     yield self._visit(SearchState.of_tests(tests))
-
-
-def _modulus_deviation(fit: FitResult) -> float:
-    """Deviation of the median shear modulus of the tests from that of bushing rubber, in standard deviations."""
-    moduli = [
-        np.median(np.abs(test.measured)) / stiffness_per_modulus(fit.model.bushing, test.direction)
-        for test in fit.data_sets
-    ]
-    typical, spread = USUAL_MODULUS
-    return float(np.log(np.median(moduli) / typical)) / spread
-
-
-def _record_change(base: FitResult, corrected: FitResult) -> float:
-    """Largest relative change of a recorded stiffness (complex), amplitude or frequency in a correction of the record.
-
-    The value is 1 if the dimensions of the bushing or the direction of a test are corrected.
-
-    Args:
-        base: fit to the tests as recorded.
-        corrected: fit to the corrected tests.
-    """
-    pairs = list(zip(base.data_sets, corrected.data_sets, strict=True))
-    if base.model.bushing != corrected.model.bushing or any(
-        before.direction != after.direction for before, after in pairs
-    ):
-        return 1.0
-    recorded = [(getattr(before, name), getattr(after, name)) for before, after in pairs for name in _RECORDED]
-    return max(float(np.max(np.abs(after / before - 1.0))) for before, after in recorded)
 
 
 def prior_odds(explanations: Sequence[Explanation]) -> dict[tuple[str, str], float]:
