@@ -18,15 +18,15 @@ import tempfile
 import uuid
 import zipfile
 from collections.abc import Mapping
-from importlib.resources import files
 from pathlib import Path
-from xml.etree import ElementTree as ET
+from typing import Any
 
 from bushfit.errors import OutputError
 from bushfit.export.contract import Exported, ExportRequest
 from bushfit.export.in_time import FIELDS, TABLES, UNIT_FIELDS, TimeModel, time_model
 from bushfit.geometry import Unit
 from bushfit.reading.tablefile import folder_name
+from bushfit.templates import render_template
 from bushfit.version import __version__
 
 #: Folder of the library in an FMU, its suffix, and the system in the compiler's target, by `sys.platform`.
@@ -42,8 +42,11 @@ _OPTIONS = (
     *("-shared", "-O2", "-std=c99", "-fPIC", "-fvisibility=hidden", "-ffp-contract=off", "-s"),
     *("-ffreestanding", "-nostdlib", "-DFREESTANDING", "-Wall", "-Wextra", "-Werror"),
 )
-#: Sources that all FMUs share.
+#: Folder of the sources; sources that all FMUs share; and files that are made from templates for each FMU.
+_FOLDER = Path(__file__).with_name("c")
 _SHARED = ("fmu.c", "bushing.c", "bushing.h", "fmi2.h")
+_DESCRIPTION = "modelDescription.xml"
+_WRITTEN = ("model.c", "model.h", _DESCRIPTION)
 #: Exponents of SI base units, by unit with integer exponents.
 _BASE_UNITS: Mapping[str, Mapping[str, int]] = TABLES["units"]
 #: Characters that XML does not allow.
@@ -68,18 +71,13 @@ def export(request: ExportRequest) -> Exported:
     model = time_model(request)
     safe_name = re.sub(r"[^A-Za-z0-9]+", "_", folder_name(request.result.name))
     name = f"bushfit_{safe_name[:40].strip('_').lower()}"
-    sources = {file: _source(file) for file in _SHARED}
-    sources |= {"model.c": model_source(model).encode()}
-    without_guid = [model_description(request, model, name, ""), model_header(model, "").encode()]
-    digest = hashlib.sha256(b"".join([*sources.values(), *without_guid])).digest()
-    guid = f"{{{uuid.UUID(bytes=digest[:16])}}}"
-    sources |= {"model.h": model_header(model, guid).encode()}
+    shared = {file: (_FOLDER / file).read_bytes() for file in _SHARED}
+    digest = hashlib.sha256(b"".join([*shared.values(), *model_files(request, model, name, "").values()])).digest()
+    written = model_files(request, model, name, f"{{{uuid.UUID(bytes=digest[:16])}}}")
+    description = written.pop(_DESCRIPTION)
+    sources = shared | written
     path, library = compile_library(sources, name)
-    content = {
-        "modelDescription.xml": model_description(request, model, name, guid),
-        path: library,
-        **{f"sources/{file}": source for file, source in sources.items()},
-    }
+    content = {_DESCRIPTION: description, path: library, **{f"sources/{file}": text for file, text in sources.items()}}
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
         for file, data in content.items():  # without dates, so that equal contents give equal bytes
@@ -135,53 +133,8 @@ def compile_library(sources: Mapping[str, bytes], name: str) -> tuple[str, bytes
         return f"binaries/{system}/{name}{suffix}", (Path(folder) / f"{name}{suffix}").read_bytes()
 
 
-def model_header(model: TimeModel, guid: str) -> str:
-    """Write the C header of an FMU, with the lengths of the lists and the GUID.
-
-    Returns:
-        Content of model.h.
-    """
-    sizes = {
-        "VALUES": _OFFSET + len(model.values),
-        "CONSTANTS": _OFFSET + sum(not value.settable for value in model.values),
-        "DIRECTIONS": len(model.places),
-        "PARTS": max(1, len(model.arms)),
-        "ARMS": max(1, len(model.arm_rows)),
-    }
-    listed = ", ".join(f"{name} = {size}" for name, size in sizes.items())
-    return f'#define GUID "{guid}"\nenum {{ {listed} }};\n'
-
-
-def model_source(model: TimeModel) -> str:
-    """Write the C source with the values, directions and Maxwell arms of a model.
-
-    Returns:
-        Content of model.c.
-    """
-    values, reference = model.values, {value.name: index for index, value in enumerate(model.values, start=_OFFSET)}
-    lists = {
-        "start": [0.0, 1.0, *(value.value for value in values)],
-        "least": [0.0, 1.0, *(value.bounds[0] for value in values)],
-        "most": [0.0, 1.0, *(value.bounds[1] for value in values)],
-    }
-    lines = ['#include "bushing.h"', ""]
-    for name, numbers in lists.items():
-        lines += [f"const double {name}[VALUES] = {{", f"    {', '.join(f'{number!r}' for number in numbers)}", "};"]
-    lines.append("const Direction directions[DIRECTIONS] = {")
-    all_fields = [field for effect_fields in FIELDS.values() for field in effect_fields]
-    for fields, lever in zip(model.fields, model.levers, strict=True):
-        neutral = {field: int(field in UNIT_FIELDS) for field in all_fields if field not in fields}
-        indices = {**neutral, **{field: reference[name] for field, name in fields.items()}}
-        listed = ", ".join(f".{field} = {index}" for field, index in indices.items())
-        lines.append(f"    {{{listed}, .lever = {lever!r}}},")
-    lines += ["};", "const Arm arms[ARMS] = {"]
-    rows = model.arm_rows or ((0, 0.0, 1.0),)
-    lines += [f"    {{{part}, {share!r}, {time!r}}}," for part, share, time in rows]
-    return "\n".join([*lines, "};", ""])
-
-
-def model_description(request: ExportRequest, model: TimeModel, name: str, guid: str) -> bytes:
-    """Write modelDescription.xml, the description of the variables of an FMU.
+def model_files(request: ExportRequest, model: TimeModel, name: str, guid: str) -> dict[str, bytes]:
+    """Write the files of an FMU that depend on the model: C source and header, and the description of its variables.
 
     Args:
         request: model, predictions and settings.
@@ -190,73 +143,33 @@ def model_description(request: ExportRequest, model: TimeModel, name: str, guid:
         guid: identifier that has to be equal in the description and the library.
 
     Returns:
-        Content of the XML file in UTF-8.
+        Contents by file name.
     """
     about = f"Rubber bushing, displacement in and force out, of {request.source.file} (SHA-256 {request.source.sha256})"
-    about = "; ".join([about, *map(": ".join, request.remarks(model.omissions))])
-    root = ET.fromstring(_source("modelDescription.xml"))
-    root.attrib |= {"modelName": _xml_text(request.result.name), "guid": guid, "description": _xml_text(about)}
-    root.set("generationTool", f"bushfit {__version__}")
-    simulation, definitions, _, variables, structure = root
-    simulation.set("modelIdentifier", name)
-    displays = {  # of displacements and forces by SI unit, where the two differ
-        unit: display
-        for place in model.places
-        for unit, display in zip(
-            (place.motion.displacement_unit, place.motion.force_unit), place.display[:2], strict=True
-        )
-        if unit != "1" and display.factor != 1.0
+    displays: dict[str, Unit] = {}
+    for place in model.places:
+        length, force, _ = place.display
+        displays |= {place.motion.displacement_unit: length, place.motion.force_unit: force}
+    units = {*displays, *(value.unit for value in model.values)} - {"", "1"}
+    reference = {value.name: index for index, value in enumerate(model.values, start=_OFFSET)}
+    neutral = {field: int(field in UNIT_FIELDS) for fields in FIELDS.values() for field in fields}
+    context = {
+        "request": request,
+        "model": model,
+        "name": name,
+        "guid": guid,
+        "about": "; ".join([about, *map(": ".join, request.remarks(model.omissions))]),
+        "version": __version__,
+        "displays": {unit: displays[unit] for unit in units & displays.keys() if displays[unit].factor != 1.0},
+        "units": sorted(units),
+        "base_units": _BASE_UNITS,
+        "offset": _OFFSET,
+        "directions": [neutral | {field: reference[key] for field, key in fields.items()} for fields in model.fields],
+        "finalize": _xml_text,
     }
-    add_variables(variables, model, displays)
-    for unit in sorted({real.attrib["unit"] for real in variables.iter("Real") if "unit" in real.attrib}):
-        definition = ET.SubElement(definitions, "Unit", {"name": unit})
-        if unit in _BASE_UNITS:
-            ET.SubElement(definition, "BaseUnit", {base: str(power) for base, power in _BASE_UNITS[unit].items()})
-        if unit in displays:
-            display = {"name": displays[unit].name, "factor": repr(displays[unit].factor)}
-            ET.SubElement(definition, "DisplayUnit", display)
-    for index, variable in enumerate(variables, start=1):
-        for unknowns in structure if variable.attrib["causality"] == "output" else ():
-            ET.SubElement(unknowns, "Unknown", {"index": str(index)})
-    ET.indent(root)
-    return ET.tostring(root, encoding="utf-8", xml_declaration=True)
+    return {file: render_template(_FOLDER / f"{file}.jinja", **context).encode() for file in _WRITTEN}
 
 
-def add_variables(variables: ET.Element, model: TimeModel, displays: Mapping[str, Unit]) -> None:
-    """Add the scalar variables of an FMU to its description: displacement and force of each place, then the values.
-
-    Args:
-        variables: XML element `ModelVariables`.
-        model: time-domain model.
-        displays: display units by SI unit.
-    """
-    count, rows = _OFFSET + len(model.values), list[tuple[str, int, dict[str, str], str, dict[str, str]]]()
-    for index, place in enumerate(model.places, start=count):
-        units = place.motion.displacement_unit, place.motion.force_unit
-        length, newton = ({"displayUnit": displays[unit].name} if unit in displays else {} for unit in units)
-        displacement, force = (f"{word}.{place}" for word in place.motion.words[:2])
-        attributes = {"causality": "input", "variability": "continuous"}
-        rows.append((displacement, index, attributes, units[0], {**length, "start": "0"}))
-        attributes = {"causality": "output", "variability": "continuous", "initial": "calculated"}
-        rows.append((force, index + len(model.places), attributes, units[1], newton))
-    for reference, value in enumerate(model.values, start=_OFFSET):
-        attributes = {"description": _xml_text(value.meaning), "causality": "local", "variability": "constant"}
-        real = {"start": repr(value.value)}
-        if value.settable:
-            attributes |= {"causality": "parameter", "variability": "tunable"}
-            real = {"min": repr(value.bounds[0]), "max": repr(value.bounds[1]), **real}
-        rows.append((value.name, reference, {**attributes, "initial": "exact"}, value.unit, real))
-    for name, reference, attributes, unit, real in rows:
-        names = {"name": _xml_text(name), "valueReference": str(reference)}
-        variable = ET.SubElement(variables, "ScalarVariable", {**names, **attributes})
-        ET.SubElement(variable, "Real", {**({} if unit in ("", "1") else {"unit": unit}), **real})
-
-
-def _source(file: str) -> bytes:
-    """Content of a C source, or of the skeleton of the XML description, that all FMUs share, from the package."""
-    return (files("bushfit.export") / "c" / file).read_bytes()
-
-
-def _xml_text(text: str) -> str:
-    """Replace characters that XML does not allow by underscores."""
-    return _NO_XML.sub("_", text)
+def _xml_text(value: Any) -> Any:
+    """Replace characters in a text that XML does not allow by underscores; numbers and XML remain unchanged."""
+    return _NO_XML.sub("_", value) if isinstance(value, str) and not hasattr(value, "__html__") else value
