@@ -10,7 +10,8 @@ attributes and units as in the public fixture `fixture.bus` of the package suspe
 Altair TeimOrbit format and AutoBush, which reads the same files.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -24,7 +25,6 @@ from bushfit.export.deck import (
     comment_lines,
     common_omissions,
     describe_amplitudes,
-    encode_deck,
     exported_directions,
     format_real,
     heading,
@@ -34,6 +34,7 @@ from bushfit.geometry import ROTATION, TRANSLATION
 from bushfit.prediction.caveats import format_deviation
 from bushfit.prediction.static_curve import StaticCurve, static_curve, static_rate
 from bushfit.reading.measurement import loss_factor
+from bushfit.templates import render_template
 from bushfit.units import number
 
 #: Names of displacement and force in each degree of freedom, from 1 to 6.
@@ -123,51 +124,40 @@ def export(request: ExportRequest) -> Exported:
         )
     omissions = {kind: [element.describe_error(kind) for element in elements] for kind in _KINDS}
     files = {
-        f"bushing_{kind}.bus": encode_deck(_property_file(request, elements, kind, [*omissions[kind], *shared]))
-        for kind in _KINDS
+        f"bushing_{kind}.bus": _property_file(request, elements, kind, [*omissions[kind], *shared]) for kind in _KINDS
     }
     return Exported(files, (*omissions["car"], *omissions["ride"], *shared))
 
 
-def _property_file(
-    request: ExportRequest, elements: Sequence[_Element], kind: Kind, omissions: Sequence[str]
-) -> Iterator[str]:
-    """Yield the lines of a property file for Adams Car or Adams Car Ride.
+def _property_file(request: ExportRequest, elements: Sequence[_Element], kind: Kind, omissions: Sequence[str]) -> bytes:
+    """Write a property file for Adams Car or Adams Car Ride.
 
     Args:
         request: model, predictions and settings.
         elements: element of each direction.
         kind: "car" for Adams Car, "ride" for Adams Car Ride.
         omissions: sentences on properties that the format cannot represent.
+
+    Returns:
+        Content of the file.
     """
     amplitudes = describe_amplitudes([element.reference for element in elements])
     rates = ", ".join(f"{element.curve.direction} {element.curve.rate_text}" for element in elements)
     about = [f"damping at {number(elements[0].frequency, 4)} Hz, {amplitudes}", f"static curves at {rates}"]
-    yield from comment_lines("$", [*heading(request, ", ".join(_UNITS.values()), omissions), _KINDS[kind], *about])
-    yield from _block("MDI_HEADER", {"FILE_TYPE": "'bus'", "FILE_VERSION": "4.0", "FILE_FORMAT": "'ASCII'"})
-    yield from _block("UNITS", {name: f"'{unit}'" for name, unit in _UNITS.items()})
-    damping, curves = [0.0] * len(_AXES), [(np.arange(-2.0, 3.0), np.zeros(5))] * len(_AXES)
+    comments = comment_lines("$", [*heading(request, ", ".join(_UNITS.values()), omissions), _KINDS[kind], *about])
+    damping, curves = [0.0] * len(_AXES), [np.stack((np.arange(-2.0, 3.0), np.zeros(5)), axis=1)] * len(_AXES)
     for element in elements:
         displacement, force = _SCALES[element.reference.direction.motion]
         scale = force / displacement if kind == "car" else float(np.degrees(1.0))
+        curve = np.stack((element.curve.displacement * displacement, element.curve.mean.value * force), axis=1)
         for dof in DOFS[element.reference.direction]:
-            damping[dof - 1] = scale * element.damping[kind]
-            curves[dof - 1] = element.curve.displacement * displacement, element.curve.mean.value * force
+            damping[dof - 1], curves[dof - 1] = scale * element.damping[kind], curve
     if (stated := request.cardanic) is not None:
         rate = stated.imag / (2.0 * np.pi * elements[0].frequency)
         turn, moment = _SCALES[ROTATION]
         for dof in CARDANIC:
             damping[dof - 1] = moment / turn * rate if kind == "car" else float(np.degrees(np.angle(stated)))
-            curves[dof - 1] = curves[dof - 1][0], curves[dof - 1][0] * stated.real * moment / turn
-    values = zip(_AXES, damping, strict=True)
-    yield from _block("DAMPING", {f"{force.upper()}_DAMPING": format_real(value) for (_, force), value in values})
-    for (motion_axis, resisting), curve in zip(_AXES, curves, strict=True):
-        yield from _block(f"{resisting.upper()}_CURVE", {})
-        yield f"{{{motion_axis:>16} {resisting:>17}}}"
-        yield from (f"{format_real(x, 10):>17} {format_real(y):>17}" for x, y in zip(*curve, strict=True))
-
-
-def _block(name: str, attributes: Mapping[str, str]) -> Iterator[str]:
-    """Yield the lines of a block: its name in brackets, then its attributes."""
-    yield f"[{name}]"
-    yield from (f" {key} = {value}" for key, value in attributes.items())
+            curves[dof - 1] = curves[dof - 1][:, :1] * (1.0, stated.real * moment / turn)
+    rows = [(*axes, *values) for axes, values in zip(_AXES, zip(damping, curves, strict=True), strict=True)]
+    template = Path(__file__).with_name("adams.bus.jinja")
+    return render_template(template, comments=comments, units=_UNITS, rows=rows, real=format_real).encode("ascii")
