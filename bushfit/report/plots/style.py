@@ -9,11 +9,12 @@ import textwrap
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from threading import RLock
 from typing import Any, Literal, NamedTuple, Self
 
 import numpy as np
-from matplotlib import colormaps, rc_context, rcParamsDefault
+from matplotlib import colormaps, rc_context, rc_params_from_file, rcParamsDefault
 from matplotlib.axes import Axes
 from matplotlib.backend_bases import get_registered_canvas_class
 from matplotlib.cm import ScalarMappable
@@ -34,8 +35,9 @@ _WIDTH = 16.0
 ROW = 5.4
 #: Heights [cm]: margin above a title and below an explanation, with the gap to the panels, and a line of each.
 _MARGIN, _TITLE_LINE, _NOTE_LINE = 0.4, 0.42, 0.33
-#: Sizes of the labels of axes, and of ticks, legends and explanations [point]: the smallest that is readable in print.
-TEXT, SMALL = 8.5, 7.5
+#: Settings of the style sheet, and its sizes of the labels of axes, and of ticks, legends and explanations [point].
+_STYLE = rc_params_from_file(Path(__file__).with_name("bushfit.mplstyle"), use_default_template=False)
+TEXT, SMALL = _STYLE["axes.labelsize"], _STYLE["legend.fontsize"]
 #: Marker options of a measured point, and of one of thousands of points.
 POINT: dict[str, Any] = {"ms": 4.2, "mec": "white", "mew": 0.4}
 DOT: dict[str, Any] = {"ms": 2.4, "mew": 0}
@@ -78,25 +80,9 @@ _WIDER_FONTS = {"Noto Sans CJK SC", "Noto Sans CJK JP", "WenQuanYi Zen Hei", "Mi
 _SETTINGS: dict[Any, Any] = {
     key: value for key, value in rcParamsDefault.items() if key.partition(".")[0] not in ("backend", "interactive")
 } | {
+    **_STYLE,
     # one font to search for, not the fourteen of "sans-serif", and installed ones for names in further scripts
     "font.family": ["DejaVu Sans", *sorted({font.name for font in fontManager.ttflist} & _WIDER_FONTS)],
-    "text.parse_math": False,
-    "axes.grid": True,
-    "axes.axisbelow": True,
-    "axes.labelsize": TEXT,
-    "axes.labelcolor": INK,
-    "grid.color": "#d9d9d9",
-    "grid.linewidth": 0.5,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.formatter.useoffset": False,
-    "legend.frameon": False,
-    "legend.fontsize": SMALL,
-    "legend.title_fontsize": SMALL,
-    **{f"{axis}tick.labelsize": SMALL for axis in "xy"},
-    **{f"{axis}tick.color": INK for axis in "xy"},
-    "svg.hashsalt": "bushfit",
-    "pdf.fonttype": 42,
 }
 #: matplotlib's settings belong to the process: one figure at a time changes them.
 _LOCK = RLock()
