@@ -22,6 +22,7 @@ from bushfit.reading.layout import DELIMITERS
 from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.reading.names import NO_LABELS, Labels
+from bushfit.reading.preload import parse_preload
 from bushfit.reading.roles import PAIRS
 from bushfit.reading.source import Channels, Sheet
 from bushfit.reading.stated import LoopFile, SweepFile
@@ -33,6 +34,9 @@ from bushfit.validation import validate_tables
 
 #: [Hz] Frequency above which a motion in steps is a stepped sine; chosen: quasi-static loops are slower.
 _QUASI_STATIC = 1.0
+#: Distance of a stated preload from the mean of a loop, relative to its range, from which they contradict each other;
+#: chosen: rubber relaxes by less.
+_FAR_FROM_MEAN = 0.5
 
 
 def inspect_file(file: Path, test_options: Mapping[str, Any], of_book: Labels = NO_LABELS) -> Inspection:
@@ -74,8 +78,10 @@ def inspect_file(file: Path, test_options: Mapping[str, Any], of_book: Labels = 
         settings = reader_arguments(table, read_as, entry, LoopFile)["test"]
         kind, (facts, odd) = classify_recording(measured, by_name, settings)
         odd = turned + odd
-        if "preload" in facts:
-            entry.setdefault("preload", facts["preload"])
+        if preload := facts.get("preload"):
+            if "preload" in label_keys and is_contradicted(entry["preload"], measured):
+                odd.append(f"the preload {entry.pop('preload')} that the text states is not in the record: {preload}")
+            entry.setdefault("preload", preload)
     contents = describe_format(table), describe_columns(table, is_sweep=is_sweep), facts | label_facts, tuple(odd)
     is_uncounted = is_sweep and not counted and "amplitude" not in entry
     return Inspection(file, kind, place, *contents, entry, measured, amplitude_convention_unknown=is_uncounted)
@@ -180,6 +186,14 @@ def read_either_sign(table: Table, place: Place, entry: dict[str, Any]) -> tuple
         "has the opposite sign; state force_sign = -1 in the campaign"
     )
     return loop, turned, [odd]
+
+
+def is_contradicted(text: str, loop: Loop) -> bool:
+    """True if a preload stated in text, such as "5 N", is far from the mean of the loop, whatever its sign."""
+    if (preload := parse_preload(text, loop.direction)) is None:
+        return False
+    channel = loop.force if preload.unit == loop.direction.motion.force_unit else loop.displacement
+    return abs(abs(preload.value) - abs(float(channel.mean()))) > _FAR_FROM_MEAN * float(np.ptp(channel))
 
 
 def classify_recording(measured: Loop, by_name: Labels, test: LoopFile) -> tuple[Kind, Findings]:

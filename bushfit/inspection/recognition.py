@@ -50,6 +50,7 @@ def recognize_table(file: Path, test_options: Mapping[str, Any]) -> tuple[Table,
         MeasurementError, UnitError: unclear columns or units, which may be those of a test.
     """
     opened: list[tuple[Table, bool]] = []
+    complete: list[tuple[Table, bool]] = []
     failed: list[tuple[Mapping[str, Sequence[str]], BushfitError]] = []
     try:
         content = open_content(file, test_options)
@@ -64,9 +65,12 @@ def recognize_table(file: Path, test_options: Mapping[str, Any]) -> tuple[Table,
             continue
         opened.append((table, is_sweep))
         if missing_role(table, is_sweep=is_sweep) is None:
-            return table, is_sweep
-        if is_sweep:
+            complete.append((table, is_sweep))
+        elif is_sweep and not complete:
             refuse_ambiguous_damping(table)
+    if complete:  # a sweep before a loop, and columns of a stiffness or modulus before the amplitude of a force
+        direct = [pair for pair in PAIRS if pair[0] != "force_amplitude"]
+        return min(complete, key=lambda one: (not one[1], not any(set(pair) <= {*one[0].roles} for pair in direct)))
     resonance: Table | None = None
     with suppress(BushfitError):  # whose columns are not those of a resonance test
         resonance = open_table(content, RESONANCE_COLUMNS, test_options)

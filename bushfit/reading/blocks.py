@@ -7,10 +7,11 @@ from itertools import groupby, islice, pairwise, zip_longest
 from typing import NamedTuple
 
 from bushfit import units
-from bushfit.reading.headers import COUNTED, Vocabulary
+from bushfit.reading.headers import COUNTED, SWEEP_COLUMNS, Vocabulary, split_unit
 from bushfit.reading.layout import WITH_UNIT, Layout, Line, is_comment, is_row, is_summary_row, is_units_row
 from bushfit.reading.names import NO_LABELS, Labels, labels_above, labels_in_names, named_direction
 from bushfit.reading.numerals import is_like_number, plainest_value
+from bushfit.reading.roles import PAIRS
 from bushfit.reading.source import Channels, RowSource, Sheet, Text, cells_of
 
 #: Largest text that is searched for blocks without their own headers [bytes]; chosen: some 100,000 rows.
@@ -23,6 +24,12 @@ _NUMERIC = b"0123456789.,+-eEdD \t\r\n"
 _COMPLEX = re.compile(
     r"\(?\s*([+-]?[\d.,]+(?:[eEdD][+-]?\d+)?)\s*([+-]\s*[\d.,]+(?:[eEdD][+-]?\d+)?)\s*\*?\s*[ij]\s*\)?"
 )
+#: Roles of conditions, whose levels belong to different tests.
+CONDITIONS = ("temperature", "preload")
+#: Roles of columns that every operating point fills.
+_OF_POINTS = {role for pair in PAIRS for role in pair}
+#: Names of the runs of a test, in the titles of blocks.
+_RUNS = Vocabulary({"repeat": SWEEP_COLUMNS["repeat"]})
 #: First rows that are searched for complex numbers and units; chosen: room for remarks.
 _FIRST = 8
 
@@ -79,6 +86,7 @@ def combined(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> tuple
     """
     if isinstance(source, Channels) or len(layout.headers) < 2 or layout.headerless:
         return source, layout
+    source, layout = _filled_down(source, layout, vocabulary)
     sides = _find_sides(layout)
     if sides and (blocks := _side_by_side(source, layout, sides)):
         shared = slice(0, sides[0].start)
@@ -96,12 +104,50 @@ def combined(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> tuple
     numbers, content, width = list[int](), list[Sequence[str | float]](), len(layout.headers)
     for index, row in ((index, row) for index, block in enumerate(blocks) for row in block.rows):
         cells, texts = cells_of(row, layout.delimiter), [column[index] for column in added.values()]
-        content.append([*cells, *[""] * (width - len(cells)), *texts] if len(cells) <= width else cells)
+        is_remark = not any(is_like_number(str(cell)) for cell in cells)
+        content.append(cells if is_remark or len(cells) > width else [*cells, *[""] * (width - len(cells)), *texts])
         numbers.append(row.number)
     layout = replace(layout, headers=(*layout.headers, *added), units=(*layout.units, *[""] * len(added)))
     head = [line for line in source.head() if line.number < layout.header_line]
     above = [line for line in head if not labels_above([line]).quantities]  # those of a block are in its rows
     return _with_plain_cells(Sheet(source.sheet or "", content, above=above, numbers=numbers), layout)
+
+
+def _filled_down(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> tuple[RowSource, Layout]:
+    """Repeat levels, such as amplitudes, that a table states only in the first of several rows.
+
+    Returns:
+        Source with filled cells, without rows that contain only the levels, and layout with a note; both unchanged if
+        no column of a condition or stepped quantity has more empty cells than numbers below a first number.
+    """
+    roles = [heading.role if header and (heading := vocabulary.heading(header)) else "" for header in layout.headers]
+
+    def is_point(cells: Sequence[str | float]) -> bool:
+        """True for a row with a stiffness or its loss, unlike rows of a waveform and rows that contain only a level."""
+        return any(cell != "" and role in _OF_POINTS for cell, role in zip(cells, roles, strict=False))
+
+    lines = (line for line in source.head() if line.number > layout.lines_before_data)
+    first = [cells for line in lines if is_point(cells := cells_of(line, layout.delimiter))]
+    levels = set[int]()
+    for index in (n for n, role in enumerate(roles) if role in ("amplitude", "frequency", *CONDITIONS)):
+        filled = [index < len(row) and row[index] != "" for row in first]
+        if filled and filled[0] and 2 * sum(filled) <= len(filled):
+            levels.add(index)
+    if not levels:
+        return source, layout
+    numbers, content, before = list[int](), list[Sequence[str | float]](), dict[int, str | float]()
+    for line in source.lines(layout.lines_before_data):
+        cells = list(cells_of(line, layout.delimiter))
+        before |= {index: cells[index] for index in levels if index < len(cells) and is_like_number(str(cells[index]))}
+        if is_point(cells):
+            cells = [before.get(n, "") if cell == "" and n in levels else cell for n, cell in enumerate(cells)]
+        if any(cell != "" for n, cell in enumerate(cells) if n not in levels or not is_like_number(str(cell))):
+            content.append(cells)
+            numbers.append(line.number)
+    names = ", ".join(f'"{layout.headers[index]}"' for index in sorted(levels))
+    note = f"{names}: an empty cell has the value of the cell above"
+    head = [line for line in source.head() if line.number < layout.header_line]
+    return Sheet(source.sheet or "", content, above=head, numbers=numbers), replace(layout, notes=(*layout.notes, note))
 
 
 def exchange_rows(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> Sheet | None:
@@ -237,16 +283,18 @@ def _label_columns(
         if role not in roles and len(kinds) == 1 and all(len(matches) == 1 for matches in by_block):
             unit, convention = kinds.pop()
             columns[f"{role}{COUNTED[convention]} [{unit}]"] = [float(one.text.split()[0]) for (one,) in by_block]
-    degrees = [(label.temperature or "").partition(" ") for label in labels]
-    if "temperature" not in roles and all(map(any, degrees)) and len({unit for *_, unit in degrees}) == 1:
-        columns[f"temperature [{degrees[0][2]}]"] = [float(number) for number, *_ in degrees]
+    for role in CONDITIONS:
+        texts = [(getattr(label, role) or "").strip().partition(" ") for label in labels]
+        if role not in roles and all(map(any, texts)) and len({unit for *_, unit in texts}) == 1:
+            columns[f"{role} [{texts[0][2]}]"] = [float(number) for number, *_ in texts]
     directions = [named_direction([title], short=True) for title in titles]
     if all(directions):
         columns["direction"] = [str(direction) for direction in directions]
+    are_runs = all(_RUNS.heading(title.rstrip(" #.0123456789")) for title in parts)
     numbers = [label.specimen_number or "" for label in labels]
     named = numbers if all(numbers) else [] if columns else parts
     if named and all(named) and len(set(named)) > 1:
-        columns["part"] = list(named)
+        columns["repeat" if named == parts and are_runs else "part"] = list(named)
     columns["block"] = [str(number) for number in range(1, len(labels) + 1)]
     return columns
 
@@ -268,7 +316,7 @@ def _with_plain_cells(source: RowSource, layout: Layout) -> tuple[RowSource, Lay
         if unit := unit_of[index]:
             row_of_units[index] = row_of_units[index] or unit
         elif is_complex[index]:
-            name, unit_text = units.split_header(headers[index])
+            name, unit_text, _ = split_unit(headers[index])
             suffix = f" [{unit_text}]" if unit_text else ""
             headers[index : index + 1] = [f"{name} real{suffix}", f"{name} imaginary{suffix}"]
             row_of_units[index : index + 1] = [row_of_units[index]] * 2

@@ -270,6 +270,8 @@ class Vocabulary:
                 *self._names_with_symbol(name, unit),
             ):
                 for role in self._roles.get(word, ()):
+                    if unit and role in self._roles.get(plain(unit), ()):
+                        unit = None  # a symbol instead of a unit: "Loss factor (tan d)"
                     if extreme and role not in (("amplitude", "force_amplitude") if is_extreme else ("time",)):
                         continue  # "min" is no unit but of a time
                     is_unit = units.is_unit if role != "temperature" else units.kelvin_scale

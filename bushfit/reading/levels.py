@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from bushfit.errors import UnitError
 from bushfit.geometry import Direction, Motion
+from bushfit.reading.blocks import CONDITIONS
 from bushfit.reading.headers import Column
 from bushfit.reading.labelled import column_texts
 from bushfit.reading.measurement import SAME_TEMPERATURE, Floats
@@ -21,8 +22,6 @@ from bushfit.units import CELSIUS, is_compatible, kelvin_scale, number
 ONE_TEST = 5.0
 #: Smallest step between preloads of different tests, relative to the largest one; chosen: rubber relaxes by less.
 _PRELOAD_STEP = 0.1
-#: Roles of columns whose levels belong to different tests.
-CONDITIONS = ("temperature", "preload")
 
 
 @dataclass(frozen=True)

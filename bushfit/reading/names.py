@@ -171,7 +171,8 @@ def _labels_in_name(name: str) -> Labels:
         if word in _WORDS["preload"] or (unit in ("N", "kN") and word in _WORDS["force"]):
             values.setdefault("preload", text)
         elif unit == "degC":
-            is_plain = (match["unit"].lower() != "c" or len(match["number"]) > 1) and not is_joined
+            is_sure = len(match["unit"]) > 1 or (match["unit"] == "C" and re.match(r"[1-9]\d|\d\D", match["number"]))
+            is_plain = bool(is_sure) and not is_joined
             if (is_plain or word in _WORDS["temperature"]) and _TEMPERATURES[0] < value < _TEMPERATURES[1]:
                 values.setdefault("temperature", text)
         elif unit in ("N", "kN") or value <= 0.0:

@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 from bushfit import units
 from bushfit.errors import MeasurementError
-from bushfit.reading.blocks import find_segments
+from bushfit.reading.blocks import CONDITIONS, find_segments
 from bushfit.reading.headers import COUNTED, AmplitudeConvention, Vocabulary, split_convention
 from bushfit.reading.layout import Layout, Line, is_comment, is_row, is_summary_row
 from bushfit.reading.numerals import is_like_number, plainest_value
@@ -31,7 +31,7 @@ _MOST_HEADER_ROWS = 4
 #: Number in a header, with its symbol ("A = 0.1") and the word after it, which may be its unit.
 _LEVEL = re.compile(
     r"(?:(?P<name>[^\W\d_]+)\s*=\s*)?(?<![\w.,*'|])±?(?P<number>\d+(?:[.,]\d+)?(?:e[+-]?\d+)?)(?![.,]?\d)"
-    r"(?:\s*[\[(]?\s*(?P<unit>[^\W\d_]+|%|°)[\])]?)?",
+    r"(?:\s*[\[(]?\s*(?P<unit>[^\W\d_]+|%|°(?!\s*[CFK]))[\])]?)?",
     re.IGNORECASE,
 )
 #: Role of a level by the symbol before it: "A = 0.1".
@@ -155,9 +155,13 @@ def _read_block(headers: Sequence[list[str]], rows: Sequence[Line], vocabulary: 
         row = {column: _read_header(texts[column], vocabulary) for column in columns}
         levels = {meaning.stepped for meaning in row.values() if meaning.level}
         unclear = [column for column in columns if texts[column] and row[column] == _Meaning()]
+        corners = _read_corner(cells[0], vocabulary)
+        is_name = cells[0] != "" and not is_like_number(cells[0])
+        if is_name and levels == {None} and not any(corner.stepped or corner.unit for corner in corners):
+            break  # a name and its value above the table
         if unclear and not (levels and all(is_summary_row([texts[column]]) for column in unclear)):
             break
-        for corner in _read_corner(cells[0], vocabulary):
+        for corner in corners:
             axis = replace(corner, level_unit=corner.level_unit or corner.unit, unit=None)
             if corner.role is not None or corner.level:
                 continue
@@ -212,7 +216,10 @@ def _read_header(text: str, vocabulary: Vocabulary) -> _Meaning:
     )
     if not rest:
         return level
-    if named := _named_quantity(rest, vocabulary):
+    named = _named_quantity(rest, vocabulary)
+    if rest.startswith("°") or (named and named.role in ("repeat", *CONDITIONS)):
+        return _Meaning()  # "Run 1", "23 °C" and "Preload 500 N" are no amplitudes
+    if named:
         return level | replace(named, convention=convention)
     role = None if stepped else _role_of_unit(unit := rest.strip("[]() "))
     return replace(level, level_unit=unit, stepped=role) if role else _Meaning()
