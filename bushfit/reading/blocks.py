@@ -126,12 +126,11 @@ def _filled_down(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> t
         """True for a row with a stiffness or its loss, unlike rows of a waveform and rows that contain only a level."""
         return any(cell != "" and role in _OF_POINTS for cell, role in zip(cells, roles, strict=False))
 
-    lines = (line for line in source.head() if line.number > layout.lines_before_data)
-    first = [cells for line in lines if is_point(cells := cells_of(line, layout.delimiter))]
-    levels = set[int]()
+    below = (line for line in source.head() if line.number > layout.lines_before_data)
+    rows = [[*cells_of(line, layout.delimiter), *[""] * len(roles)] for line in below]
+    points, levels = list(filter(is_point, rows)), set[int]()
     for index in (n for n, role in enumerate(roles) if role in ("amplitude", "frequency", *CONDITIONS)):
-        filled = [index < len(row) and row[index] != "" for row in first]
-        if filled and filled[0] and 2 * sum(filled) <= len(filled):
+        if points and rows[0][index] != "" and 2 * sum(row[index] != "" for row in points) <= len(points):
             levels.add(index)
     if not levels:
         return source, layout
