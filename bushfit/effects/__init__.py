@@ -35,10 +35,10 @@ _TABLE: dict[str, Any] = tomllib.loads(Path(__file__).with_name("library.toml").
 #: Fields of an effect's record that the Python file of the effect may define.
 _LAW = (
     *("modulus", "stress", "in_place_of"),  # of a branch
-    *("adjust", "shift_factor", "stiffness", "force"),  # of a modifier, and of a layer
+    *("adjust", "shift_factor", "stiffness", "force", "response_factor"),  # of a modifier, and of a layer
 )
 #: Kind of an effect, by the field that only this kind has.
-_KINDS: dict[str, type[Effect]] = {"modulus": Branch, "adjust": Modifier, "stiffness": Layer}
+_KINDS: dict[str, type[Effect]] = {"modulus": Branch, "adjust": Modifier, "stiffness": Layer, "response_factor": Layer}
 
 
 def _full_entry(name: str) -> dict[str, Any]:

@@ -290,14 +290,22 @@ class Layer(Effect):
     Args:
         turns: True if the layer also acts in torsion.
         adds: name of the parameter to sum over adjacent layers with the same equation, such as compliances in series.
+        response_factor: (values, setting) -> number or array by which the layer multiplies both stiffness and force;
+            None for other layers, which have the next two functions.
         stiffness: (values, response below, omega [rad/s], amplitude [m or rad], setting) -> complex stiffness outside.
         force: (values, force below, displacement history, setting) -> force outside the layer [N or N m].
     """
 
     turns: bool = True
     adds: str | None = None
-    stiffness: Callable[[Values, StiffnessBelow, Array, Array, Setting], Array]
-    force: Callable[[Values, ForceBelow, History, Setting], Array]
+    response_factor: Callable[[Values, Setting], Value] | None = None
+    stiffness: Callable[[Values, StiffnessBelow, Array, Array, Setting], Array] | None = None
+    force: Callable[[Values, ForceBelow, History, Setting], Array] | None = None
+
+    def __post_init__(self) -> None:
+        """Raise a TypeError for a layer without a law."""
+        if not (self.response_factor or (self.stiffness and self.force)):
+            raise TypeError("a layer needs the functions stiffness and force, or response_factor")
 
     def acts_at(self, place: Place) -> bool:
         """Return True if the layer acts in tests of this direction or specimen.
@@ -350,21 +358,6 @@ def scaled_values(p: Values, names: tuple[str, ...], factor: Value) -> dict[str,
     {'mu': 500000.0}
     """
     return {name: p[name] * factor for name in names if name in p}
-
-
-def scaled_response(
-    factor: Callable[[Values, Setting], Value], p: Values, below: Callable[..., Array], *motion_and_setting: Any
-) -> Array:
-    """Stiffness, or force over time, of an effect that multiplies both by one factor, such as the gain of a load cell.
-
-    Args:
-        factor: function of the parameter values and the setting that gives the factor.
-        p: parameter values of the effect by name.
-        below: function that gives the stiffness [N/m or N m/rad] or force [N or N m] without this effect.
-        motion_and_setting: arguments of `below` (omega and amplitude, or history), then the setting.
-    """
-    *motion, setting = motion_and_setting
-    return factor(p, setting) * below(*motion)
 
 
 def harmonic_stress(modulus: Callable[[Values, Array, Array], Array], p: Values, history: History) -> Array:

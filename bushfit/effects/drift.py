@@ -4,14 +4,12 @@ Warming up and wear cause an even drift. Settling under a preload (of a clamp, a
 follows the logarithm of time.
 """
 
-from functools import partial
-
 import numpy as np
 
-from bushfit.effects.contract import Setting, Value, Values, scaled_response
+from bushfit.effects.contract import Setting, Value, Values
 
 
-def _gain(p: Values, setting: Setting) -> Value:
+def response_factor(p: Values, setting: Setting) -> Value:
     """Ratio of recorded to true force, which drifts over the session: 1 + gain ln(1 + t/onset)/ln(1 + 1/onset).
 
     Args:
@@ -23,15 +21,12 @@ def _gain(p: Values, setting: Setting) -> Value:
 
     >>> from bushfit.effects.contract import RubberConditions
     >>> halfway = Setting(None, "axial", "sweep", RubberConditions(session_time=0.5))
-    >>> float(_gain({"gain": 0.02, "onset": 1e6}, halfway).round(6))
+    >>> float(response_factor({"gain": 0.02, "onset": 1e6}, halfway).round(6))
     1.01
-    >>> float(_gain({"gain": 0.02, "onset": 0.01}, halfway).round(6))
+    >>> float(response_factor({"gain": 0.02, "onset": 0.01}, halfway).round(6))
     1.017039
     """
     session_time = setting.conditions.session_time
     if session_time is None:
         return 1.0
     return 1.0 + p["gain"] * np.log1p(np.asarray(session_time) / p["onset"]) / np.log1p(1.0 / p["onset"])
-
-
-stiffness = force = partial(scaled_response, _gain)

@@ -1,13 +1,18 @@
-"""Force gain: the force channels of loops and sweeps disagree; stiffness and force in loops are 1 + gain times larger.
+"""Force gain: the force channels of loops and sweeps disagree; loops are 1 + gain times stiffer."""
 
-Parameter: gain [1]. Source: sensitivity error of a force transducer, ISO 376:2011.
+from bushfit.effects.contract import Setting, Value, Values
 
->>> stiffness({"gain": 0.02}, spring, 1.0, 1e-4, loop), stiffness({"gain": 0.02}, spring, 1.0, 1e-4, sweep)
-(510000.0, 500000.0)
-"""
 
-from functools import partial
+def response_factor(p: Values, setting: Setting) -> Value:
+    """Ratio of recorded to true force: 1 + gain in loops, 1 in sweeps.
 
-from bushfit.effects.contract import scaled_response
+    Args:
+        p: parameter values by name: gain [1].
+        setting: the test: bushing, direction and kind (sweep or loop).
 
-stiffness = force = partial(scaled_response, lambda p, setting: 1.0 + p["gain"] if setting.kind == "loop" else 1.0)
+    Notes: sensitivity error of a force transducer, ISO 376:2011.
+
+    >>> response_factor({"gain": 0.02}, loop), response_factor({"gain": 0.02}, sweep)
+    (1.02, 1.0)
+    """
+    return 1.0 + p["gain"] if setting.kind == "loop" else 1.0

@@ -1,14 +1,16 @@
 """Stiffness factor: stiffness and force of one direction, or one specimen, are multiplied by one factor.
 
-Parameter: factor [1], measured over computed stiffness. `transducer_gain` and `preload_stiffening` have the same
-equation, for a wrong load cell (ISO 376:2011) and for a preload.
-
->>> stiffness({"factor": 0.9}, spring, 1.0, 1e-4, sweep)
-450000.0
+`transducer_gain` and `preload_stiffening` have the same equation, for a wrong load cell (ISO 376:2011) and for a
+preload.
 """
 
-from functools import partial
+from bushfit.effects.contract import Setting, Value, Values
 
-from bushfit.effects.contract import scaled_response
 
-stiffness = force = partial(scaled_response, lambda p, _: p["factor"])
+def response_factor(p: Values, setting: Setting) -> Value:
+    """Ratio of measured to computed stiffness: the parameter factor [1].
+
+    >>> response_factor({"factor": 0.9}, sweep)
+    0.9
+    """
+    return p["factor"]

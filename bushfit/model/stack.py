@@ -73,6 +73,9 @@ class Stack:
         """
         if self.layers:
             layer, layer_values = self.layers[-1]
+            if layer.response_factor:
+                return layer.response_factor(layer_values, self.setting) * self.below(omega, amplitude)
+            assert layer.stiffness  # every other layer has it
             return layer.stiffness(layer_values, self.below, omega, amplitude, self.setting)
         model, place, values = self.model, self.setting.direction, self.values
         strain = amplitude * model.unit_strain(place)
@@ -113,6 +116,9 @@ class Stack:
         """
         if self.layers:
             layer, layer_values = self.layers[-1]
+            if layer.response_factor:
+                return layer.response_factor(layer_values, self.setting) * self.below.force(displacement)
+            assert layer.force  # every other layer has it
             return layer.force(layer_values, self.below.force, displacement, self.setting)
         model, setting, values, structure = self.model, self.setting, self.values, self.model.structure
         per_displacement = model.unit_strain(setting.direction)
