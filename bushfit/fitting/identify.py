@@ -101,7 +101,9 @@ def undetermined_parameters(
     """
     if not names:
         return []
-    directions = _error_directions(model, data_sets, names)
+    _, slopes = FitProblem(model, data_sets, names).linearise(model)
+    slopes = slopes[:, : sum(test.size for test in data_sets)] * relative_sizes(model, names)[:, None]
+    directions = _error_directions(slopes)
     groups, lines = _groups(names, directions), list[str]()
     changes = np.abs(Coordinates.of_parameters(model, names).slopes(model.values) * relative_sizes(model, names))
     stderr = {name: covariance.stderr(name) or 0.0 for name in names}
@@ -117,10 +119,11 @@ def undetermined_parameters(
             effect = effect_name_of(name)
             remark = f": these tests do not show {effect}" * (effect in unseen)
             lines.append(f"{name} does not differ from {neutral[name]:g}{remark}")
-        names = [name for name in names if name not in zero and effect_name_of(name) not in unseen]
+        kept = [name not in zero and effect_name_of(name) not in unseen for name in names]
+        names = [name for name, keep in zip(names, kept, strict=True) if keep]
         if not names:
             return lines
-        directions = _error_directions(model, data_sets, names)
+        directions = _error_directions(slopes[kept])
         groups = _groups(names, directions)
     if not groups:
         return []
@@ -147,20 +150,16 @@ def _percent(error: float) -> str:
     return f"{float(f'{100.0 * error:.2g}'):g} %" if error < _BEYOND else "beyond 1000 %"
 
 
-def _error_directions(model: Model, data_sets: Sequence[MeasuredTest], names: Sequence[str]) -> Array:
+def _error_directions(slopes: Array) -> Array:
     """Independent errors of relative parameter changes: eigenvectors of their covariance times their standard errors.
 
     Args:
-        model: fitted model.
-        data_sets: tests.
-        names: names of the k parameters.
+        slopes: derivatives of the n whitened residuals with respect to relative changes of k parameters, (k, n).
 
     Returns:
         Relative change of each parameter due to each of the k independent errors, (k, k), one column per error. The sum
         of squares along a row is the variance of a parameter; the sum of the columns' outer products is the covariance.
     """
-    _, slopes = FitProblem(model, data_sets, names).linearise(model)
-    slopes = slopes[:, : sum(test.size for test in data_sets)] * relative_sizes(model, names)[:, None]
     values, vectors = np.linalg.eigh(slopes @ slopes.T)
     return np.asarray(vectors / np.sqrt(np.maximum(values, np.finfo(float).eps * values.max())))
 

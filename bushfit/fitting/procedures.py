@@ -30,7 +30,7 @@ from bushfit.fitting.preload import PRELOAD, other_line
 from bushfit.fitting.preparation import MeasuredTest, sources, with_level_errors
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.problem import FitResult
-from bushfit.fitting.profile import limit95, profile95
+from bushfit.fitting.profile import find_limit, profile95
 from bushfit.fitting.robust import estimate, outlier_warnings
 from bushfit.geometry import get_places
 from bushfit.model.covariance import Covariance
@@ -105,8 +105,9 @@ def fit_joint(
     notes = [note + NEXT for note in notes]
     notes += unfitted_warnings(found.model, unused, NEXT)
     usable = expected_errors(found.model, found.problem.tests, unused, found)
-    result = _result(data, [found], notes=notes, unused=unused)
+    result = build_result([found], data.bounds, unused=unused, advice=NEXT)
     result = replace(result, usable=usable, model_error=error, alternatives=other_line(found))
+    result = _with_campaign(data, [found], result, notes)
     return replace(result, profile=profile95(found, result.covariance)) if profile else result
 
 
@@ -130,9 +131,11 @@ def fit_static(data: PreparedCampaign, springpot: Result | None = None) -> Resul
     fixed = {name: values[name] for name in DYNAMIC if name in values}
     if len(fixed) < len(DYNAMIC):
         found = _fit_without_springpot(data)
-        return _result(data, [found], notes=[_springpot_warning(data, found)])
+        result = build_result([found], data.bounds, advice=NEXT)
+        return _with_campaign(data, [found], result, [_springpot_warning(data, found)])
     uncertainty = springpot.covariance.restricted(DYNAMIC) if springpot else None
-    return _result(data, [_fit_step(data, data.static_loops(), BASE, fixed)], uncertainty)
+    found = _fit_step(data, data.static_loops(), BASE, fixed)
+    return _with_campaign(data, [found], build_result([found], data.bounds, fixed=uncertainty, advice=NEXT))
 
 
 def fit_dynamic(data: PreparedCampaign, static: Result) -> Result:
@@ -146,7 +149,8 @@ def fit_dynamic(data: PreparedCampaign, static: Result) -> Result:
     """
     fixed = {name: static.model.values[name] for name in STATIC}
     found = _fit_step(data, [data.smallest_sweep], BASE, fixed)
-    return _result(data, [found], static.covariance.restricted(STATIC))
+    result = build_result([found], data.bounds, fixed=static.covariance.restricted(STATIC), advice=NEXT)
+    return _with_campaign(data, [found], result)
 
 
 def given_static(data: PreparedCampaign) -> Result | None:
@@ -181,7 +185,8 @@ def fit_two_step(data: PreparedCampaign) -> TwoStep:
         model, before = dynamic.model, passes[-1] if passes else {}
         passes.append(dict(model.values))
         if all(abs(before.get(name, np.inf) - value) <= _AGREED * abs(value) for name, value in passes[-1].items()):
-            return TwoStep(tuple(passes), _result(data, [static, dynamic]))
+            result = build_result([static, dynamic], data.bounds, advice=NEXT)
+            return TwoStep(tuple(passes), _with_campaign(data, [static, dynamic], result))
         coordinates = Coordinates.of_parameters(model, DYNAMIC)
         if springpot:
             points.append(coordinates.point(springpot))
@@ -242,23 +247,18 @@ def _fit_step(
     return estimate(data.problem(effects, tests, fixed), robust=data.robust, lmfit=True)
 
 
-def _result(
-    data: PreparedCampaign,
-    steps: Sequence[FitResult],
-    fixed: Covariance | None = None,
-    notes: Sequence[str] = (),
-    unused: Sequence[MeasuredTest] = (),
+def _with_campaign(
+    data: PreparedCampaign, steps: Sequence[FitResult], result: Result, notes: Sequence[str] = ()
 ) -> Result:
-    """Build the result of a procedure, with the warnings on its campaign.
+    """Add the specimens, the outliers and the warnings on the campaign to the result of a procedure.
 
     Args:
         data: prepared campaign.
         steps: fits of the procedure, in order.
-        fixed: covariance of parameters that all steps kept fixed; None if these are exact.
-        notes: sentences to report in addition.
-        unused: tests that no step fitted, to compare the model with.
+        result: result of these fits.
+        notes: sentences to report first.
     """
-    model, tests = steps[-1].model, [test for step in steps for test in step.data_sets]
+    model, tests = result.model, [test for step in steps for test in step.data_sets]
     outliers = tuple(outlier for step in steps for outlier in step.outliers)
     warnings = (
         *notes,
@@ -276,9 +276,9 @@ def _result(
             if model.values.keys().isdisjoint(prior.names)
         ),
         *outlier_warnings(outliers, robust=data.robust),
+        *result.warnings,
     )
-    result = build_result(steps, data.bounds, fixed=fixed, notes=warnings, unused=unused, advice=NEXT)
-    return replace(result, outliers=outliers, specimens=data.campaign.specimens)
+    return replace(result, warnings=warnings, outliers=outliers, specimens=data.campaign.specimens)
 
 
 def build_result(
@@ -315,17 +315,20 @@ def build_result(
     stages = [step.stage(step.at_bound if without_bounded else ()) for step in steps]
     cov = covariance(last.model, stages, fixed, last.smooth_error)
     priors = {name: use for step in steps for name, use in prior_uses(step, cov).items()}
+    sentences = [*notes, *prior_warnings(priors)]
+    for step in steps:
+        limited, limits = replace(step, problem=replace(step.problem, bounds=bounds)), dict[str, float | None]()
+        for name, end in step.at_bound.items():
+            if bounds.get(name, (None, None))[end == "max"] is None:
+                limits[name] = find_limit(limited, name, "max" if end == "min" else "min")
+        sentences += fit_warnings(last.model, step, limits, cov, advice)
     return Result(
         model,
         tuple(name for name in names if not (bounded_is_fixed and name in at_bound)),
         cov,
         quality(model, tests, len(names)),
         measured_range(model, tests),
-        (
-            *notes,
-            *prior_warnings(priors),
-            *(sentence for step in steps for sentence in fit_warnings(last.model, step, bounds, cov, advice)),
-        ),
+        tuple(sentences),
         sources(tests),
         at_bound=at_bound,
         tests=misfits(model, tests, unused),
@@ -334,13 +337,16 @@ def build_result(
     )
 
 
-def fit_warnings(model: Model, step: FitResult, bounds: Bounds, covariance: Covariance, advice: str = "") -> list[str]:
+def fit_warnings(
+    model: Model, step: FitResult, limits: Mapping[str, float | None], covariance: Covariance, advice: str = ""
+) -> list[str]:
     """Warnings about the tests of a fit, parameters at bounds, parameters not determined, and a misfit.
 
     Args:
         model: fitted model.
         step: result of the fit, one step of a procedure.
-        bounds: limits of parameters that the campaign gives, by name [SI].
+        limits: one-sided 95 % limits [SI] of the parameters that ended at a bound of the model, not of the campaign, by
+            name; None for a parameter that the tests do not limit.
         covariance: covariance of the fitted parameters.
         advice: text to append to the sentence on a misfit.
 
@@ -365,11 +371,10 @@ def fit_warnings(model: Model, step: FitResult, bounds: Bounds, covariance: Cova
             f"the fit was stopped after {step.evaluations} evaluations of the model, because chi-square hardly fell: "
             "some parameters are undetermined"
         )
-    limited = replace(step, problem=replace(step.problem, bounds=bounds))
     for name, end in at_bound.items():
-        if bounds.get(name, (None, None))[end == "max"] is not None:
+        if name not in limits:
             sentences.append(f"{name} is at the {end} given in [fit]")
-        elif (limit := limit95(limited, name)) is None:
+        elif (limit := limits[name]) is None:
             sentences.append(f"{name} ended at a limit of the model: the data do not determine it")
         else:
             unit, factor = display_unit(step.model.parameters[name].unit, 1.0, limit)

@@ -6,7 +6,7 @@ profile differ if a parameter is barely determined.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -18,6 +18,8 @@ from bushfit.fitting.descent import Descent
 from bushfit.fitting.preparation import split_by_kind
 from bushfit.fitting.problem import FitResult
 from bushfit.model.covariance import Z95, Covariance
+from bushfit.model.model import Model
+from bushfit.model.result import End
 from bushfit.progress import track
 
 #: Longest step of the search, in coordinates, which are of order one: one that the fit of the others follows.
@@ -44,62 +46,62 @@ _ONE_SIDED = 1.6448536269514722
 Interval = tuple[float | None, float | None]
 
 
-@dataclass(frozen=True, eq=False)
-class _Profile:
-    """Profile of chi-square over one parameter: its minimum over all others, at fixed values of the parameter.
+def find_limit(
+    best: FitResult,
+    name: str,
+    end: End,
+    step: float = _BLIND_STEP,
+    allowed: float | None = None,
+    fits: dict[float, FitResult] | None = None,
+) -> float | None:
+    """Find the value of a parameter at which chi-square, minimised over all others, has risen by the allowed amount.
 
     Args:
-        name: name of the parameter.
         best: fit of all parameters.
-        known: cache of fits of the other parameters, by the coordinate of this parameter.
+        name: name of the parameter.
+        end: bound to search towards.
+        step: step of the search, in coordinates.
+        allowed: allowed square root of the rise of chi-square; None for a one-sided 95 % limit. If the model misses the
+            tests, the rise is then multiplied by the reduced chi-square.
+        fits: cache of fits of the other parameters, by the coordinate of this parameter; shared by both ends.
+
+    Returns:
+        Value [SI]; None if there is no end before the bound, or if it is far away and due to a bound of another
+        parameter.
     """
+    from scipy.optimize import brentq
 
-    name: str
-    best: FitResult
-    known: dict[float, FitResult]
+    i, coordinates = list(best.names).index(name), Coordinates.of_parameters(best.model, [name])
+    start, bound = best.coordinates.point(best.model.values)[i], best.problem.limits[end == "max"][i]
+    fits = {start: best} if fits is None else fits
+    allowed = _ONE_SIDED * np.sqrt(excess(best)) if allowed is None else allowed
 
-    def value(self, coordinate: float) -> float:
-        """Value of the parameter [SI] for a coordinate of the fit, which is mostly its natural log."""
-        (value,) = Coordinates.of_parameters(self.best.model, [self.name]).values([coordinate]).values()
-        return float(np.clip(value, *self.best.model.parameters[self.name].bounds))  # exp(log(bound)) may lie beyond it
+    def model_at(coordinate: float) -> Model:
+        """Model of the nearest fit, with the parameter at a coordinate of the fit, which is mostly its natural log."""
+        value = np.clip(coordinates.values([coordinate])[name], *best.model.parameters[name].bounds)
+        return fits[min(fits, key=lambda known: abs(known - coordinate))].model.with_values({name: float(value)})
 
-    def fitted(self, coordinate: float) -> FitResult:
-        """Fit the other parameters, with this parameter fixed at a coordinate."""
-        if coordinate not in self.known:
-            nearest = self.known[min(self.known, key=lambda known: abs(known - coordinate))]
-            model = nearest.model.with_values({self.name: self.value(coordinate)})
-            names = [name for name in self.best.names if name != self.name]
-            problem = replace(self.best.problem, model=model, names=names)
-            # five to ten evaluations are the rule, and the tolerance is far below what the rise is compared with
-            self.known[coordinate] = Descent.start(problem, 1e-7).run(100).solution
-        return self.known[coordinate]
-
-    def root_rise(self, coordinate: float) -> float:
+    def root_rise(coordinate: float) -> float:
         """Square root of the rise of chi-square above its minimum, with the parameter fixed at a coordinate."""
-        return float(np.sqrt(max(self.fitted(coordinate).chi_square - self.best.chi_square, 0.0)))
+        if coordinate not in fits:
+            others = [other for other in best.names if other != name]
+            problem = replace(best.problem, model=model_at(coordinate), names=others)
+            # five to ten evaluations are the rule, and the tolerance is far below what the rise is compared with
+            fits[coordinate] = Descent.start(problem, 1e-7).run(100).solution
+        return float(np.sqrt(max(fits[coordinate].chi_square - best.chi_square, 0.0))) - allowed
 
-    def find_limit(self, start: float, bound: float, step: float, allowed: float) -> float | None:
-        """Find one end [SI] of the interval: the root of the rise of chi-square is `allowed`; None if there is no end.
-
-        Args:
-            start: coordinate of the best value.
-            bound: coordinate of the bound to search towards.
-            step: step of the search, in coordinates.
-            allowed: allowed square root of the rise of chi-square.
-        """
-        from scipy.optimize import brentq
-
-        steps = start + np.copysign(step, bound - start) * np.arange(_MOST_STEPS + 1)
-        for current, ahead in pairwise(np.clip(steps, min(start, bound), max(start, bound)).tolist()):
-            if self.root_rise(ahead) < allowed:
-                continue
-            crossing = brentq(lambda u: self.root_rise(u) - allowed, current, ahead, xtol=_PRECISION * step)
-            found = self.fitted(crossing)
-            new_bounds = not set(found.at_bound) <= set(self.best.at_bound)
-            # by which chi-square would fall there if others could leave the bounds that they met on the way
-            fall = found.gain(self.best.at_bound) if new_bounds and abs(crossing - start) > _FAR else 0.0
-            return None if fall > _HELD_BY_OTHERS * allowed**2 else self.value(crossing)
-        return None
+    steps = start + np.copysign(step, bound - start) * np.arange(_MOST_STEPS + 1)
+    for current, ahead in pairwise(np.clip(steps, min(start, bound), max(start, bound)).tolist()):
+        if root_rise(ahead) < 0.0:
+            continue
+        crossing = brentq(root_rise, current, ahead, xtol=_PRECISION * step)
+        root_rise(crossing)  # mostly known
+        found = fits[crossing]
+        new_bounds = not set(found.at_bound) <= set(best.at_bound)
+        # by which chi-square would fall there if others could leave the bounds that they met on the way
+        fall = found.gain(best.at_bound) if new_bounds and abs(crossing - start) > _FAR else 0.0
+        return None if fall > _HELD_BY_OTHERS * allowed**2 else model_at(crossing).values[name]
+    return None
 
 
 def profile95(best: FitResult, covariance: Covariance) -> Mapping[str, Interval]:
@@ -128,38 +130,22 @@ def profile95(best: FitResult, covariance: Covariance) -> Mapping[str, Interval]
             found=f"{len(names)} fitted",
             hint="leave out --profile, or fix fewer parameters in [fit]",
         )
-    start, limits = best.coordinates.point(best.model.values), np.transpose(best.problem.limits)
+    start = best.coordinates.point(best.model.values)
     linear = linear_errors(best.jacobian)
     half = np.array([covariance.half_widths.get(name, 0.0) for name in names])  # 0 of one at a bound
     # how far a model error, or a gain of a loop that the weights do not contain, bends parameters, no weight tells
     loops, _ = split_by_kind(best.problem.tests)
     missed = any(test.model_error for test in best.problem.tests) or not all(loop.gain_weighs for loop in loops)
-    widest = np.inf if missed else _WIDEST * Z95 * np.sqrt(_excess(best))
+    widest = np.inf if missed else _WIDEST * Z95 * np.sqrt(excess(best))
     allowed = np.clip(half / best.coordinates.slopes(best.model.values) / linear, Z95, widest)
     found: dict[str, Interval] = {}
     for i, name in enumerate(track("profiles", names)):
-        profile = _Profile(name, best, {start[i]: best})
-        step = min(_FIRST_REACH * allowed[i] * linear[i], _LONGEST_STEP)
-        low, high = (profile.find_limit(start[i], bound, step, allowed[i]) for bound in limits[i])
-        found[name] = low, high
+        fits, step = {start[i]: best}, min(_FIRST_REACH * allowed[i] * linear[i], _LONGEST_STEP)
+        low = find_limit(best, name, "min", step, allowed[i], fits)
+        found[name] = low, find_limit(best, name, "max", step, allowed[i], fits)
     return found
 
 
-def limit95(best: FitResult, name: str) -> float | None:
-    """One-sided 95 % limit [SI] of a parameter that ended at a bound; None if the data set no limit.
-
-    If the model misses the data, the allowed rise of chi-square is multiplied by the reduced chi-square.
-
-    Args:
-        best: result of the fit.
-        name: name of the parameter.
-    """
-    i = list(best.names).index(name)
-    start, inward = best.coordinates.point(best.model.values)[i], int(best.at_bound[name] == "min")
-    profile = _Profile(name, best, {start: best})
-    return profile.find_limit(start, best.problem.limits[inward][i], _BLIND_STEP, _ONE_SIDED * np.sqrt(_excess(best)))
-
-
-def _excess(best: FitResult) -> float:
+def excess(best: FitResult) -> float:
     """Factor on the allowed rise of chi-square for a model that misses its tests: reduced chi-square, at least 1."""
     return max(reduced_chi_square(best.model, best.problem.tests, len(best.names))[0], 1.0)

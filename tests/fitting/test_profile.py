@@ -13,7 +13,7 @@ from bushfit.campaign.simulated import SimulatedLoop, SimulatedSweep
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.problem import FitProblem
 from bushfit.fitting.procedures import fit_joint
-from bushfit.fitting.profile import limit95
+from bushfit.fitting.profile import find_limit
 from bushfit.geometry import Direction
 from bushfit.model.file import from_document, to_document
 from bushfit.model.model import FIVE
@@ -87,7 +87,7 @@ def test_what_rests_on_a_bound_is_told_by_how_far_from_it_the_tests_let_it_be(ri
     data = PreparedCampaign.from_campaign(replace(rig(0, rubber, **plan(1e-3)), rig=RigSettings(gain_error=0.0)))
     best = solve(FitProblem(fit_joint(data).model, data.select_tests(None), FIVE))
     assert best.at_bound == {"mu": "min"}
-    limit = limit95(best, "mu")
+    limit = find_limit(best, "mu", "max")
     assert limit is not None
     held = best.model.with_values({"mu": limit})
     rise = solve(FitProblem(held, data.select_tests(None), FIVE[1:])).chi_square - best.chi_square
