@@ -42,7 +42,7 @@ def fit_campaign_families(
     """
     data = prepare_tests(campaign)
     data_sets = [data_set.with_weight() for data_set in data.select_tests(directions or None)]
-    model = data.starting_model(data.effects, data_sets, {})
+    model = data.starting_model(data.effects, data_sets)
     fixed = [name for name, setting in campaign.fit.parameters.items() if not setting.vary]
     families, unlikely = fit_families(model, data_sets, names, fixed, data.bounds)
     adjusted = iter(holm([family.p for family in families if family.p is not None]))

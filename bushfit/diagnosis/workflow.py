@@ -118,7 +118,7 @@ def _initial_fit(
     hint = "add measured tests to the campaign"
     data_sets = data.require_tests(data.data_sets, "there is nothing to diagnose", hint)
     start = data.start_values(data_sets)
-    model = replace(model or data.starting_model(data.effects, data_sets, {}), constraints=data.constraints)
+    model = replace(model or data.starting_model(data.effects, data_sets), constraints=data.constraints)
     if settings.adopt:
         model = model.without(UNNAMED)  # a correction of an earlier diagnosis contains what is adopted now
     start = {name: value for name, value in start.items() if name in model.values and name not in fixed}

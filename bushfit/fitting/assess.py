@@ -172,9 +172,12 @@ def reduced_chi_square(model: Model, data_sets: Sequence[MeasuredTest], paramete
         data_sets: tests.
         parameters: number of fitted parameters.
     """
-    residuals = np.concatenate([test.residual(model) for test in data_sets])
-    freedom = max(sum(data_set.residual_count for data_set in data_sets) - parameters, 1)
-    return float(residuals @ residuals) / freedom, freedom
+    chi_square, freedom = 0.0, -parameters
+    for test in data_sets:
+        residuals = test.residual(model)
+        chi_square += float(residuals @ residuals)
+        freedom += test.residual_count
+    return chi_square / max(freedom, 1), max(freedom, 1)
 
 
 def lack_of_fit(model: Model, data_sets: Sequence[MeasuredTest], parameters: int) -> float | None:

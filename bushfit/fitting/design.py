@@ -101,8 +101,10 @@ def with_effect(
             fits.append(Descent.start(FitProblem.with_fixed(start, data_sets, fixed, bounds)).run(_FIRST))
     if not fits:
         raise FitError("the model has no finite response to these tests", found=effect.name)
-    best = sorted(fits, key=lambda descent: descent.chi_square)[:_BEST]
-    return min((descent.run(_MOST) for descent in best), key=lambda descent: descent.chi_square).solution
+    finished = list[Descent]()
+    for descent in sorted(fits, key=lambda descent: descent.chi_square)[:_BEST]:
+        finished.append(descent.run(_MOST))
+    return min(finished, key=lambda descent: descent.chi_square).solution
 
 
 def shape_start_values(data_sets: Sequence[MeasuredTest], model: Model, parameter: Parameter) -> Array:

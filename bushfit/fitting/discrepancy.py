@@ -88,8 +88,10 @@ class FittedTests:
         """Derivatives of ln K at the p points with respect to the k parameter coordinates not at a bound, (k, p)."""
         model, moving = self.solution.model, self.solution.moving
         names = [self.solution.names[i] for i in moving]
-        slopes = np.concatenate([log_slopes(model, data_set, names) for data_set in self.data_sets], axis=-1)
-        return slopes * self.solution.coordinates.slopes(model.values)[moving, None]
+        slopes = list[Array]()
+        for data_set in self.data_sets:
+            slopes.append(log_slopes(model, data_set, names))
+        return np.concatenate(slopes, axis=-1) * self.solution.coordinates.slopes(model.values)[moving, None]
 
     @cached_property
     def _blocks(self) -> list[tuple[MeasuredTest, slice, Array | None, Array]]:
@@ -284,7 +286,10 @@ def averaged(processes: Sequence[Discrepancy]) -> Unnamed:
     share = share[counted] / share[counted].sum()
     freedom = share @ [processes[i].likelihood.freedom(processes[i].best[1]) for i in counted]
     wider = float(stdtrit(max(freedom, _MINIMUM_FREEDOM), 0.975)) / Z95
-    means, errors = zip(*(processes[i].conditioned() for i in counted), strict=True)
+    conditioned = list[tuple[Array, Array]]()
+    for i in counted:
+        conditioned.append(processes[i].conditioned())
+    means, errors = zip(*conditioned, strict=True)
     mean = share @ np.array(means)
     deviations = np.array([[np.square((one - mean).real), np.square((one - mean).imag)] for one in means])
     error = wider * np.sqrt(np.tensordot(share, np.square(errors) + deviations, 1))

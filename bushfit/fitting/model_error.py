@@ -165,8 +165,9 @@ def closest_fit(plain_fit: FitResult, bounds: Bounds) -> tuple[FitResult, float]
         of_effects = [paper.start_values_for(effect)[0] for effect in plain_fit.model.records]
         values = {**paper.values, **{name: value for start in of_effects for name, value in start.items()}}
         starts.append(plain_fit.model.with_values({name: values[name] for name in names if name in values}))
-    sizes = [likeliest_model_error(start, tests, names) for start in starts]
-    size = min(size for size in sizes if np.isfinite(size))
+    size = np.inf
+    for start in starts:
+        size = np.fmin(size, likeliest_model_error(start, tests, names))
     for _ in range(_MAXIMUM_ROUNDS):
         weighted, ends = [test.with_model_error(size) for test in tests], list[FitResult]()
         for start in starts:

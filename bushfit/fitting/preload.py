@@ -128,7 +128,7 @@ def _probability_of_chance(data: PreparedCampaign, tests: Sequence[MeasuredTest]
         fixed: names of parameters that stay fixed.
     """
     tests = with_gain_weighting(tests, weigh=True)
-    plain, full = _fits(data, data.problem(data.effects, tests, {}), fixed)
+    plain, full = _fits(data, data.problem(data.starting_model(data.effects, tests), tests), fixed)
     errors = level_errors(full.problem.tests, full.residual, full.jacobian, largest_error(data.campaign.rig))
     if errors.significant:
         tests = with_level_errors(tests, errors.error, errors.freedom)

@@ -1,6 +1,6 @@
 """Campaign prepared for fits: tests with their noise, and bounds, priors and ties of parameters."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -165,7 +165,7 @@ class PreparedCampaign:
             return start_values(self.campaign.bushing, data_sets, self.given_values)
 
     def starting_model(
-        self, effects: Sequence[str], data_sets: Sequence[MeasuredTest], stage_fixed: Mapping[str, float]
+        self, effects: Sequence[str], data_sets: Sequence[MeasuredTest], stage_fixed: Mapping[str, float] | None = None
     ) -> Model:
         """Build the model that a fit starts from.
 
@@ -175,12 +175,12 @@ class PreparedCampaign:
         Args:
             effects: names of the model's effects.
             data_sets: tests to fit.
-            stage_fixed: values of parameters that this fit keeps fixed, by name [SI].
+            stage_fixed: values of parameters that this fit keeps fixed, by name [SI]; None without any.
 
         Returns:
             Model with start values.
         """
-        bushing, given_values = self.campaign.bushing, self.given_values
+        bushing, given_values, stage_fixed = self.campaign.bushing, self.given_values, stage_fixed or {}
         fixed = {name: value for name, value in given_values.items() if not self.free((name,))}
         choices = [given_values] if fixed == given_values else [given_values, fixed]
         with error_location(self.campaign.path):
@@ -204,18 +204,15 @@ class PreparedCampaign:
         still = [name for name in names if name in stage_fixed or not self.free((name,))]
         return start_with_effects(models[best], plain, data_sets, still, self.bounds)
 
-    def problem(
-        self, effects: Sequence[str], data_sets: Sequence[MeasuredTest], stage_fixed: Mapping[str, float]
-    ) -> FitProblem:
-        """Build the least-squares problem of the free parameters of a model, which starts from `starting_model`.
+    def problem(self, model: Model, data_sets: Sequence[MeasuredTest], fixed: Collection[str] = ()) -> FitProblem:
+        """Build the least-squares problem of a model's parameters, except tied ones and those that the campaign fixes.
 
         Args:
-            effects: names of the model's effects.
+            model: model with the start values, as of `starting_model`.
             data_sets: tests to fit.
-            stage_fixed: values of parameters that this fit keeps fixed, by name [SI].
+            fixed: names of further parameters that this fit keeps fixed.
         """
-        model = self.starting_model(effects, data_sets, stage_fixed)
-        names = [name for name in self.free(tuple(model.parameters)) if name not in (*stage_fixed, *model.tied)]
+        names = [name for name in self.free(tuple(model.parameters)) if name not in (*fixed, *model.tied)]
         return FitProblem(model, data_sets, names, self.bounds)
 
     def free(self, names: Sequence[str]) -> tuple[str, ...]:

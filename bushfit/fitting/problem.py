@@ -91,7 +91,9 @@ class FitProblem:
         for test in self.tests:
             if (rows := test.recall("rows", model, varied)) is None:
                 values, steps = stepped_values(model, varied, test.direction)
-                stepped = test.residual_of(test.response(model, values))
+                response = test.response(model, values)
+                test.keep("response", model, np.atleast_2d(response)[-1])
+                stepped = test.residual_of(response)
                 rows = test.keep("rows", model, np.vstack(difference_quotients(stepped, steps)), varied)
             residuals.append(rows[0])
             slopes.append(rows[1:])

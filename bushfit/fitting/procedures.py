@@ -94,7 +94,7 @@ def fit_joint(
     if not preload_ranges(tests):
         effects = [name for name in effects if name != PRELOAD]
     unused = [test for test in data.data_sets if test not in tests]
-    problem = data.problem(effects, tests, {})
+    problem = data.problem(data.starting_model(effects, tests), tests)
     found = estimate(problem, robust=data.robust)
 
     def refit(errors: LevelErrors) -> FitResult:
@@ -244,7 +244,8 @@ def _fit_step(
         effects: names of the effects of the model.
         fixed: values of parameters that this step keeps fixed, by name [SI].
     """
-    return estimate(data.problem(effects, tests, fixed), robust=data.robust, lmfit=True)
+    problem = data.problem(data.starting_model(effects, tests, fixed), tests, fixed)
+    return estimate(problem, robust=data.robust, lmfit=True)
 
 
 def _with_campaign(

@@ -138,9 +138,9 @@ def predict(
         together = extrapolations(result, direction, *point, temperature, f"{direction}, with the large motion")
     else:
         models, untimed, together = candidates(result, rig=rig), [], iter(())
-    predictions = [
-        predict_with_model(source, model, direction, frequency, amplitude, conditions, over) for source, model in models
-    ]
+    predictions = list[Prediction]()
+    for source, model in models:
+        predictions.append(predict_with_model(source, model, direction, frequency, amplitude, conditions, over))
     bands: dict[str, Any] = {
         name: envelope([getattr(prediction, name) for prediction in predictions]) for name in _BANDS
     }

@@ -199,7 +199,7 @@ def test_a_ripple_of_a_dense_sweep_bends_no_parameter(rig, paper_model, seed):
 def refitted(rig) -> FitResult:
     """The sweeps of a rubber that is not quite the model, fitted with a model error."""
     data = PreparedCampaign.from_campaign(replace(spoiled(rig(3, shared=True), waves(0.03, 3)), loops=()))
-    plain = estimate(FitProblem(data.starting_model(data.effects, data.sweeps, {}), data.sweeps, FIVE, data.bounds))
+    plain = estimate(FitProblem(data.starting_model(data.effects, data.sweeps), data.sweeps, FIVE, data.bounds))
     return with_model_error(plain, data.bounds)[0]
 
 

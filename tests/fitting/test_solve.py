@@ -61,7 +61,7 @@ def test_random_starts_end_at_one_minimum(measured, axial, result, many):
     and `starting_model` takes no such start: it takes values read off the tests where they meet these better.
     """
     best, rng = np.array([result.model.values[name] for name in FIVE]), np.random.default_rng(1)
-    read_off = residual(measured.starting_model(measured.effects, axial, {}), axial)
+    read_off = residual(measured.starting_model(measured.effects, axial), axial)
     ends, costs = [], []
     for _ in range(many):
         start = dict(zip(FIVE, best * 10.0 ** rng.uniform(-1.0, 1.0, 5), strict=True))

@@ -32,7 +32,7 @@ def _plain_fit(folder: Path) -> tuple[FitResult, list[Effect]]:
     """The paper's model fitted to all tests, and the effects that it lacks."""
     data = PreparedCampaign.from_campaign(load_campaign(folder / "bushing.toml"))
     data_sets = with_gain_weighting(data.data_sets, weigh=True)
-    evidence = fit_model(data.starting_model(BASE, data_sets, {}), data_sets, (), {})
+    evidence = fit_model(data.starting_model(BASE, data_sets), data_sets, (), {})
     places = [str(test.direction) for test in evidence.data_sets]
     return evidence, [effect for effect in missing_effects(evidence.model, places) if effect.replaces is None]
 

@@ -15,7 +15,6 @@ from bushfit.report.plots.measured import (
     MOST_CURVES,
     MOST_LOOPS,
     SECTOR,
-    Curve,
     SweepGroup,
     draw_sector_means,
     loops_by_direction,
@@ -82,12 +81,18 @@ def draw_curves(panels: Sequence[Axes], group: SweepGroup, result: Result) -> No
     rows = pd.concat([curve.rows for curve in group.curves])
     largest = float(np.abs(table_stiffness(rows, group.place)).max())
     pair = ResponsePair(panels, group.place, largest, group.x_header, rows[group.x_header].to_numpy())
-    looks = style.styles(len(group.curves), group.palette)
+    looks, length = style.styles(len(group.curves), group.palette), group.place.display.displacement.factor
     for curve, look in zip(group.curves, looks, strict=True):
-        drawn = points_to_draw(curve.rows)
-        x = drawn[group.x_header].to_numpy()
-        pair.draw_points(x, table_stiffness(drawn, group.place), look, len(group.curves))
-        pair.plot(*_model_line(group, curve, result), color=look.color, ls=look.dashes, lw=1.3)
+        drawn, x = points_to_draw(curve.rows), curve.rows[group.x_header].to_numpy()
+        pair.draw_points(drawn[group.x_header].to_numpy(), table_stiffness(drawn, group.place), look, len(group.curves))
+        if not group.shares_levels or result.model.depends_on:  # conditions vary: the line joins the measured points
+            modelled = pd.Series(table_stiffness(curve.rows, group.place, "model ")).groupby(x).mean()
+            line = modelled.index.to_numpy(), modelled.to_numpy()
+        else:
+            fine = np.geomspace(x.min(), x.max(), _FINE)
+            axes = (fine, curve.level / length) if group.axis == "frequency" else (curve.level, fine / length)
+            line = fine, result.model.stiffness(group.place, *np.broadcast_arrays(*axes))
+        pair.plot(*line, color=look.color, ls=look.dashes, lw=1.3)
     names = [shorten(curve.name, 30) for curve in group.curves]
     if group.shares_levels:
         style.name_levels(panels[-1], names, group.palette)
@@ -111,27 +116,6 @@ def points_note(table: pd.DataFrame) -> str:
     hidden = int((table["stated error [-]"] > _WORST_DRAWN).sum()) if "stated error [-]" in table else 0
     left_out = f" {hidden} points with a stated error above {100 * _WORST_DRAWN:g} % are not drawn." if hidden else ""
     return f"Points: {bars}.{left_out}"
-
-
-def _model_line(group: SweepGroup, curve: Curve, result: Result) -> tuple[Array, Array]:
-    """Points of the model line of a curve: on a fine grid, or at the measured points if conditions vary.
-
-    Args:
-        group: sweeps of one direction or specimen.
-        curve: points of the sweeps at one fixed amplitude or frequency.
-        result: fitted model, with the effects of the rig.
-
-    Returns:
-        x in the unit of the table, and complex stiffness [SI], (m,) each.
-    """
-    x = curve.rows[group.x_header].to_numpy()
-    if not group.shares_levels or result.model.depends_on:
-        modelled = pd.Series(table_stiffness(curve.rows, group.place, "model ")).groupby(x).mean()
-        return modelled.index.to_numpy(), modelled.to_numpy()
-    fine = np.geomspace(x.min(), x.max(), _FINE)
-    length = group.place.display.displacement.factor
-    axes = (fine, curve.level / length) if group.axis == "frequency" else (curve.level, fine / length)
-    return fine, result.model.stiffness(group.place, *np.broadcast_arrays(*axes))
 
 
 def _draw_residuals(strips: Sequence[Axes], group: SweepGroup) -> None:
