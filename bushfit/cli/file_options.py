@@ -2,6 +2,7 @@
 
 import os
 import re
+import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
@@ -10,40 +11,17 @@ from typing import Any, Literal
 
 import click
 
-from bushfit.cli.options import DIRECTIONS, FILE, Parameter, add_parameters, option, option_group, option_name
+from bushfit.cli.options import FILE, Parameter, add_parameters, option, option_group, option_name
 from bushfit.errors import BushfitError, MeasurementError
 
-#: Options for metadata that a loop or sweep file may not contain: campaign key with its placeholder, and help text.
-_OF_TESTS = {
-    "amplitude COUNTING": "Meaning of the amplitudes in the file: zero-to-peak, peak-to-peak or rms [from the header].",
-    "at_amplitude SIZE": 'Amplitude of the whole file, such as "0.1 mm" [from a column or the file name].',
-    "at_frequency FREQUENCY": 'Frequency of the whole file, such as "10 Hz" [from a column or the file name].',
-    "temperature TEMP": 'Temperature of the test, such as "23 degC". If the file has several, it selects the rows.',
-    "preload LOAD": 'Static preload of the test, such as "500 N axial" or "none"; shown in the report.',
-    **dict.fromkeys(("rate SPEED", "frequency FREQUENCY", "waveform WAVE")),
-    "sampling_rate FREQUENCY": 'For a loop without time: speed ("10 mm/min"), frequency ("0.1 Hz") with waveform '
-    "(sine, triangle), or sampling rate [from the file].",
-    "specimen NAME": "Name of the specimen, if no bushing was tested [coupon, or bar for tension].",
-    **dict.fromkeys(("area AREA", "thickness LENGTH")),
-    "elements N": 'For a specimen of N rubber blocks in shear [1]: sheared area ("772 mm^2") and thickness ("6 mm") '
-    "of one block.",
-    "specimen_number NUMBER": "Serial number of the part. If the file has several parts, it selects the rows.",
-}
-#: Options for the file format: campaign key with its placeholder.
-_AS_WRITTEN = ("encoding NAME", "delimiter WORD", "decimal MARK", "thousands MARK", "header_line LINE", "sheet NAME")
+#: Metadata options by group and campaign key, each with its placeholder, help and permitted values; and questions.
+_TABLES: dict[str, dict[str, Any]] = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+#: Text of the question for a missing option, by key.
+QUESTIONS: dict[str, str] = _TABLES.pop("questions")
+#: All metadata options, except columns and units, by key.
+STATED: dict[str, dict[str, Any]] = {key: table for group in _TABLES.values() for key, table in group.items()}
 #: Descriptions of files that are not test files, by extension.
 _NO_TESTS = {".toml": "a campaign or another TOML file", ".json": "a model or another JSON file"}
-#: click types of the options by key; other options are texts.
-TYPES: dict[str, "click.ParamType[Any]"] = {
-    "direction": click.Choice(DIRECTIONS),
-    "delimiter": click.Choice(["comma", "semicolon", "tab", "pipe", "caret", "blanks", ",", ";", "\t", "|", "^"]),
-    "waveform": click.Choice(["sine", "triangle"]),
-    "amplitude": click.Choice(["zero-to-peak", "peak-to-peak", "rms"]),
-    **dict.fromkeys(("force_sign", "elements", "header_line"), click.INT),
-}
-_SAME_NAME = ("force_sign", *(usage.split()[0] for usage in (*_OF_TESTS, *_AS_WRITTEN)))
-#: Keys of all metadata options, except columns and units.
-STATED = ("direction", *_SAME_NAME)
 #: Pattern of an inline table of TOML in the hint of an error.
 _TABLE = re.compile(r"\{[^}]*\}")
 #: Patterns of an inline table `columns` or `units`, and of one of its entries.
@@ -64,25 +42,35 @@ def metadata_options(kind: Literal["tests", "histories", "displacements"] = "tes
         option("--unit units ROLE=UNIT", f'Unit of a column, such as "{unit}".', multiple=True),
         option("--column columns ROLE=HEADER", words, multiple=True),
     )
-    written = map(_metadata_option, _AS_WRITTEN)
     record = "test_options", partial(_test_options, kind)
-    file_format = option_group("File format, if it is not detected", *written, record=record)
+    file_format = option_group("File format, if it is not detected", *_options("format"), record=record)
     heading = "Information that is missing in the file"
     if kind == "displacements":
         return lambda function: add_parameters(function, option_group(heading, *columns, record=record), file_format)
-    sign = "Reverse the sign of the force: use -1 if the force falls while the displacement rises."
-    information = (
-        _metadata_option("direction DIRECTION", "Direction: axial, radial or torsion [from file names]."),
-        *columns,
-        _metadata_option("force_sign SIGN", sign),
-        *(_metadata_option(usage, words) for usage, words in _OF_TESTS.items() if kind == "tests"),
-    )
+    direction, sign = _options("files")
+    information = (direction, *columns, sign, *(_options("tests") if kind == "tests" else ()))
     return lambda function: add_parameters(
         function,
         click.argument("files", metavar="FILE...", nargs=-1, required=True, type=FILE, callback=require_tests),
         option_group(f"{heading}s", *information, record=record),
         file_format,
     )
+
+
+def _options(group: str) -> list[Parameter]:
+    """Create the metadata options of a group: "files", "tests" or "format"."""
+    return [
+        option(f"{option_name(key)} {table['placeholder']}", table.get("help"), type=value_type(key))
+        for key, table in _TABLES[group].items()
+    ]
+
+
+def value_type(key: str) -> click.ParamType[Any] | None:
+    """Type of the values of a metadata option, by its key; None for texts."""
+    table = STATED.get(key, {})
+    if "choices" in table:
+        return click.Choice(table["choices"])
+    return click.INT if "integer" in table else None
 
 
 def _test_options(kind: str, _: click.Context, values: dict[str, Any]) -> dict[str, Any]:
@@ -102,11 +90,6 @@ def _test_options(kind: str, _: click.Context, values: dict[str, Any]) -> dict[s
     values["columns"] = _pairs(values["columns"], "--column", "force=Kraft", roles)
     values["units"] = _pairs(values["units"], "--unit", "force=kN", roles)
     return {key: value for key, value in values.items() if value not in (None, {})}
-
-
-def _metadata_option(usage: str, words: str | None = None) -> Parameter:
-    """Create the option of a campaign key from its name and placeholder (`usage`) and its help text (`words`)."""
-    return option(option_name(usage), words, type=TYPES.get(usage.split()[0]))
 
 
 def require_tests(context: click.Context, _: click.Parameter, value: Any) -> Any:
@@ -133,8 +116,8 @@ def options_named() -> Iterator[None]:
         tables = _PAIRED.findall(hint)
         named = [f'--{kind} "{role}={text}"' for kind, entries in tables for role, text in _ENTRY.findall(entries)]
         keys = _TABLE.sub("", hint)  # in a table, amplitude is a role
-        named += [option_name(key) for key in _SAME_NAME if re.search(rf"\b{key} = ", keys)]
-        if error.file is None and error.place in _SAME_NAME:
+        named += [option_name(key) for key in STATED if key != "direction" and re.search(rf"\b{key} = ", keys)]
+        if error.file is None and error.place in STATED:
             error.place = option_name(error.place)
         if named:
             error.hint = f"{hint}; for this command: {', '.join(dict.fromkeys(named))}"

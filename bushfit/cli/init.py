@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from bushfit.cli.file_options import STATED, TYPES, direction_error, metadata_options, options_named
+from bushfit.cli.file_options import QUESTIONS, STATED, direction_error, metadata_options, options_named, value_type
 from bushfit.cli.options import command_called, flag, option, option_group, option_name
 from bushfit.cli.output import Output, with_output
 from bushfit.errors import BushfitError, CampaignError, MeasurementError, error_location, quote_path
@@ -30,21 +30,6 @@ if TYPE_CHECKING:
 _SIDES = ("inner", "outer")
 #: Pattern of an option in the hint of an error, with the role of a column if it has one.
 _NAMED = re.compile(r'--(?:(column|unit) "?(\w+)=|([a-z][a-z-]+))')
-#: Text of the question for a missing option, by key; other questions show the key.
-_WORDS = {
-    "column": "header of the column of the {role}",
-    "unit": "unit of the {role}",
-    "rate": 'rate of the motion, such as "10 mm/min", or its frequency, such as "0.1 Hz"',
-    "waveform": "waveform of the motion",
-    "amplitude": "convention of amplitudes",
-    "at_amplitude": 'amplitude of the test, such as "0.1 mm"',
-    "at_frequency": 'frequency of the test, such as "10 Hz"',
-    "temperature": 'temperature of the test, such as "23 degC"',
-    "preload": 'preload of these tests, such as "500 N axial" or "none"; Enter leaves it open',
-    "inner_diameter": 'inner diameter of the rubber, where it meets the inner sleeve, such as "20 mm"',
-    "outer_diameter": 'outer diameter of the rubber, where it meets the outer sleeve, such as "36 mm"',
-    "length": 'length of the rubber (mean of inside and outside), such as "34 mm"',
-}
 #: Key of an option, and the role for columns and units ("" for other options).
 _Key = tuple[str, str]
 #: Options that are requested once for all files, with their default answers.
@@ -311,7 +296,7 @@ class Questions:
                     raise
                 named = [(kind or key.replace("-", "_"), role) for kind, role, key in _NAMED.findall(error.hint or "")]
                 bare_error = type(error)(**{**vars(error), "hint": None if named else error.hint})
-                wanted = [(name, role) for name, role in named if role or name in STATED or name in _WORDS]
+                wanted = [(name, role) for name, role in named if role or name in STATED or name in QUESTIONS]
                 wanted.sort(key=lambda key: key[0] == "column")  # which is rarely needed
                 new = [key for key in wanted if key not in answers and not options.get(key[0])]
                 wrong = [
@@ -343,9 +328,11 @@ class Questions:
         answer = self._answers.get(key)
         if key not in _ONCE or answer is None:
             self.output.print(f"\n{error}")
-            question = _WORDS.get(name, name.replace("_", " ")).format(role=role.replace("_", " "))
+            question = QUESTIONS.get(name, name.replace("_", " ")).format(role=role.replace("_", " "))
             default = _ONCE.get(key, answer)
-            answer = click.prompt(question, default=default, type=TYPES.get(name), show_default=default != "", err=True)
+            answer = click.prompt(
+                question, default=default, type=value_type(name), show_default=default != "", err=True
+            )
             key = ("frequency", "") if name == "rate" and "Hz" in answer else key
         self._answers[key] = answer
         return {key: answer}
