@@ -8,8 +8,6 @@ import click
 
 from bushfit.errors import error_location
 
-#: Names of the directions of a bushing test; copied from `geometry`, which is slow to import.
-DIRECTIONS = ("axial", "radial", "torsion")
 Function = Callable[..., Any]
 #: Decorator that adds an option or an argument to the function of a command.
 Parameter = Callable[[Function], Function]
