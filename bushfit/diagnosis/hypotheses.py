@@ -11,8 +11,9 @@ import numpy as np
 from bushfit.diagnosis.claims import Claim
 from bushfit.diagnosis.explanations import Explanation
 from bushfit.diagnosis.faulty_parts import FaultyPart, OutlierCluster
+from bushfit.diagnosis.group_evidence import GroupEvidence
 from bushfit.diagnosis.laplace import laplace
-from bushfit.diagnosis.linear_model import GroupEvidence, LinearModel
+from bushfit.diagnosis.linear_model import LinearModel
 from bushfit.diagnosis.priors import LEVELS
 from bushfit.diagnosis.projected_columns import CompoundDeviation, GroupSet
 from bushfit.diagnosis.recorded_tests import ExplanationColumns, RecordedTests

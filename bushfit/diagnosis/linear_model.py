@@ -19,9 +19,10 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.special import chdtrc, log_ndtr, logsumexp, softmax
+from scipy.special import chdtrc, softmax
 
 from bushfit.diagnosis.explanations import Group
+from bushfit.diagnosis.group_evidence import GroupEvidence, average, block_gains, largest_gain, posterior
 from bushfit.diagnosis.priors import SIZES
 from bushfit.diagnosis.projected_columns import Batch, CompoundDeviation, GroupSet, RigRows
 from bushfit.diagnosis.rig_errors import RigErrors
@@ -33,32 +34,6 @@ _ROUNDING = 1e-9
 _NEGLIGIBLE = 1e-15
 #: Largest prior size of an amount over a standard deviation that is nearly flat; it changes the amount by a permille.
 _SMALL = 0.03
-
-
-@dataclass(frozen=True, eq=False)
-class GroupEvidence:
-    """Evidence of the tests for one explanation of a gap.
-
-    Args:
-        log_evidence: natural log of the marginal likelihood of the tests with the explanation, averaged over the sizes
-            of its amounts and of the rig's errors.
-        size: relative change of |K| due to the explanation, root mean square over the posterior.
-        likeliest: most probable prior standard deviation of the amounts, relative to |K|, one of `priors.SIZES`.
-        with_compound: evidence for the explanation together with a smooth deviation of the rubber from the model's
-            laws; None if no such deviation is considered.
-    """
-
-    log_evidence: float
-    size: float
-    likeliest: float
-    with_compound: GroupEvidence | None = None
-
-    @property
-    def total(self) -> float:
-        """Natural log of the marginal likelihood, summed over compounds with and without a deviation."""
-        if self.with_compound is None:
-            return self.log_evidence
-        return float(np.logaddexp(self.log_evidence, self.with_compound.log_evidence))
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,11 +165,9 @@ class LinearModel:
         for groups in sets:
             by_group = dict[int, GroupEvidence]()
             for batch, projections, gram in projection.products(groups):
-                gain, changes = _block_gains(batch, projections, gram)
+                gain, changes = block_gains(batch, projections, gram)
                 log_evidence = projection.base[:, None, None] + gain
-                without, bent = (
-                    _average(batch.groups, log_evidence[mask], changes[mask]) for mask in (plain, deviates)
-                )
+                without, bent = (average(batch.groups, log_evidence[mask], changes[mask]) for mask in (plain, deviates))
                 pairs = zip(without, bent if deviates.any() else [None] * len(without), strict=True)
                 numbers = np.unique(batch.groups).tolist()
                 by_group |= {n: replace(x, with_compound=y) for n, (x, y) in zip(numbers, pairs, strict=True)}
@@ -244,7 +217,7 @@ class LinearModel:
         near |= plain & (best[index] > best.max() - far)
         if curves:
             projection = self.project(self.cases[plain])
-            gains = [_posterior(gram, b)[0].max(axis=(1, 2)) for _, b, gram in projection.products(curves)]
+            gains = [largest_gain(gram, b).max(axis=1) for _, b, gram in projection.products(curves)]
             with_curve = projection.base + np.max([np.zeros(len(projection.base)), *gains], axis=0)
             near[plain] |= with_curve > with_curve.max() - far
         return self.cases[near]
@@ -310,7 +283,7 @@ class LinearModel:
         """
         projection = self.project(cases)
         ((_, projections, gram),) = projection.products(groups)
-        gain, means, variances, vectors = _posterior(gram, projections)
+        gain, means, variances, vectors = posterior(gram, projections)
         share = softmax(gain + projection.base[:, None, None], axis=(0, 2))
         mean = np.einsum("nbs,nbsi->bi", share, means)
         spread = np.einsum("nbij,nbj,nbkj->bik", vectors, np.einsum("nbs,nbsj->nbj", share, variances), vectors)
@@ -330,63 +303,3 @@ def _scale_information(grams: Array, rows: Array, precision: Array) -> tuple[Arr
     """
     scale = np.sqrt(np.maximum(np.einsum("kn,kn->k", rows, rows) + precision, np.finfo(float).tiny))
     return scale, (grams + np.diag(precision)) / np.outer(scale, scale) + _ROUNDING * np.eye(scale.size)
-
-
-def _posterior(gram: Array, projections: Array) -> tuple[Array, Array, Array, Array]:
-    """Posterior of the amounts of columns that act together, for each prior size in `priors.SIZES`.
-
-    Args:
-        gram: inner products U^T P U of the columns, (..., width, width).
-        projections: inner products U^T P r with the residuals, (..., width).
-
-    Returns:
-        Gain in log evidence, (..., sizes); mean amounts, (..., sizes, width); variances along the eigenvectors of
-        `gram`, (..., sizes, width); and these eigenvectors, (..., width, width).
-    """
-    values, vectors = (gram[..., 0], np.ones_like(gram)) if gram.shape[-1] == 1 else np.linalg.eigh(gram)
-    projections = np.einsum("...ij,...i->...j", vectors, projections)[..., None, :]
-    prior_variance = np.square(SIZES)[:, None]
-    grown = 1.0 + prior_variance * np.maximum(values, 0.0)[..., None, :]
-    variances = prior_variance / grown
-    gain = 0.5 * np.sum(prior_variance * projections**2 / grown - np.log(grown), axis=-1)
-    return gain, -(prior_variance * projections / grown) @ vectors.swapaxes(-1, -2), variances, vectors
-
-
-def _block_gains(batch: Batch, projections: Array, gram: Array) -> tuple[Array, Array]:
-    """Gains in log evidence and squared relative changes of |K| of each block, for each prior size of its amounts.
-
-    Args:
-        batch: blocks of columns that act together.
-        projections: inner products U^T P r with the residuals, (cases, blocks, width).
-        gram: inner products U^T P U within the blocks, (cases, blocks, width, width).
-
-    Returns:
-        Gains and squared changes for each of `priors.SIZES`, (cases, blocks, sizes) each.
-    """
-    gain, amounts, variances, _ = _posterior(gram, projections)
-    if (signs := batch.signs[:, None]).any():
-        standardised = signs * (amounts / np.sqrt(variances))[..., 0]
-        gain = np.where(signs != 0, gain + np.log(2.0) + log_ndtr(standardised), gain)
-    return gain, np.square(np.abs(amounts @ batch.unit)).max(axis=-1)
-
-
-def _average(groups: Array, log_evidence: Array, changes: Array) -> list[GroupEvidence]:
-    """Average the evidence for explanations over noise cases, blocks and prior sizes of the amounts.
-
-    Args:
-        groups: index of the group of each block, ascending, (blocks,).
-        log_evidence: natural log of prior weight times evidence, (cases, blocks, sizes).
-        changes: squared relative change of |K|, (cases, blocks, sizes).
-
-    Returns:
-        Evidence for each group, in order.
-    """
-    first = np.flatnonzero(np.diff(groups, prepend=-1))
-    by_block = logsumexp(log_evidence, axis=0) if len(log_evidence) else np.full(log_evidence.shape[1:], -np.inf)
-    by_size = np.logaddexp.reduceat(by_block, first, axis=0)
-    total, count = logsumexp(by_size, axis=1), np.diff(first, append=len(groups)) * SIZES.size
-    share = np.exp(log_evidence - np.repeat(total, np.diff(first, append=len(groups)))[:, None])
-    squares = np.add.reduceat(np.sum(share * changes, axis=(0, 2)), first)
-    likeliest = SIZES[np.argmax(by_size, axis=1)]
-    values = (total - np.log(count), np.sqrt(squares), likeliest)
-    return [GroupEvidence(*triple) for triple in zip(*(value.tolist() for value in values), strict=True)]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -25,43 +24,6 @@ _RECORDED = ("measured", "amplitude", "frequency")
 
 
 @dataclass(frozen=True, eq=False)
-class ExplanationColumns:
-    """Explanations of a gap that do not depend on effects, and what is part of every hypothesis.
-
-    Changes of the residuals are in units of the scatter from point to point.
-
-    Args:
-        explanations: faulty parts of the tests, and smooth curves.
-        deviation: changes of the residuals if the rubber deviates smoothly from the model's laws; None without tests.
-        errors: errors of the rig.
-    """
-
-    explanations: Sequence[Explanation]
-    deviation: Group | None
-    errors: RigErrors
-
-    @cached_property
-    def compound(self) -> CompoundDeviation | None:
-        """Deviation of the compound beside the errors of the rig; None without tests."""
-        return CompoundDeviation(self.deviation, self.errors) if self.deviation else None
-
-    @cached_property
-    def sets(self) -> list[GroupSet]:
-        """Columns of `explanations`."""
-        return GroupSet.split([e.group for e in self.explanations if e.group], self.errors)
-
-    @cached_property
-    def curves(self) -> GroupSet | None:
-        """Columns of the smooth curves among `explanations`; None without tests."""
-        curves = [e.group for e in self.explanations if e.group and e.kind == "unnamed"]
-        return GroupSet(curves, self.errors) if curves else None
-
-    def with_variance(self, variance: Array) -> ExplanationColumns:
-        """Add independent errors of the residuals, of the given variances, (n,)."""
-        return replace(self, errors=replace(self.errors, variance=variance))
-
-
-@dataclass(frozen=True, eq=False)
 class RecordedTests:
     """Tests as recorded, or with one mistake in the record corrected, with the starting model fitted to them.
 
@@ -69,8 +31,9 @@ class RecordedTests:
         base: fit of the starting model; its residuals are whitened by scatter and by errors that points share.
         bare: this fit with residuals in units of the scatter from point to point, to compare hypotheses; errors that
             points share are not part of this unit.
-        columns: explanations that do not depend on effects, beside the compound's deviation and the errors of the rig.
         rig: stated accuracy class of the rig (gain and phase errors).
+        errors: errors of the rig that points share.
+        deviation: changes of the residuals if the rubber deviates smoothly from the model's laws; None without tests.
         log_prior: natural log of the prior probability that this record is right and nothing is missing.
         claim: mistake that is corrected; None for the tests as recorded.
         change: relative change of the recorded quantities due to the correction; 0 for the tests as recorded.
@@ -78,8 +41,9 @@ class RecordedTests:
 
     base: FitResult
     bare: FitResult
-    columns: ExplanationColumns
     rig: RigSettings
+    errors: RigErrors
+    deviation: Group | None
     log_prior: float
     claim: Claim | None = None
     change: float = 0.0
@@ -90,9 +54,17 @@ class RecordedTests:
     ) -> RecordedTests:
         """Build the tests from a fit of the starting model; see the class for the arguments."""
         bare = in_scatter_units(base)
-        explanations = [*find_faulty_parts(bare), *unnamed_curves(bare)]
-        columns = ExplanationColumns(explanations, compound(bare), rig_errors(bare, rig))
-        return cls(base, bare, columns, rig, log_prior, claim, change)
+        return cls(base, bare, rig, rig_errors(bare, rig), compound(bare), log_prior, claim, change)
+
+    @cached_property
+    def columns(self) -> ExplanationColumns:
+        """Explanations of a gap that do not depend on effects, beside the errors of the rig."""
+        return ExplanationColumns(self, self.errors)
+
+    @cached_property
+    def explanations(self) -> list[Explanation]:
+        """Explanations of a gap that do not depend on effects: faulty parts of the tests, and smooth curves."""
+        return [*find_faulty_parts(self.bare), *unnamed_curves(self.bare)]
 
     @cached_property
     def compound_in_fits(self) -> Group | None:
@@ -106,6 +78,39 @@ class RecordedTests:
     def faulty_parts_in_fits(self) -> dict[str, FaultyPart]:
         """Faulty parts by name; their changes of the residuals are whitened as in a fit, not in units of scatter."""
         return {part.name: part for part in find_faulty_parts(self.base)}
+
+
+@dataclass(frozen=True, eq=False)
+class ExplanationColumns:
+    """Columns of explanations of a gap that do not depend on effects, and of what is part of every hypothesis.
+
+    Args:
+        tests: tests with these explanations.
+        errors: errors of the rig, perhaps with further scatter of some points.
+    """
+
+    tests: RecordedTests
+    errors: RigErrors
+
+    @cached_property
+    def compound(self) -> CompoundDeviation | None:
+        """Deviation of the compound beside the errors of the rig; None without tests."""
+        return CompoundDeviation(self.tests.deviation, self.errors) if self.tests.deviation else None
+
+    @cached_property
+    def sets(self) -> list[GroupSet]:
+        """Columns of all explanations."""
+        return GroupSet.split([e.group for e in self.tests.explanations if e.group], self.errors)
+
+    @cached_property
+    def curves(self) -> GroupSet | None:
+        """Columns of the smooth curves; None without tests."""
+        curves = [e.group for e in self.tests.explanations if e.group and e.kind == "unnamed"]
+        return GroupSet(curves, self.errors) if curves else None
+
+    def with_variance(self, variance: Array) -> ExplanationColumns:
+        """Add independent errors of the residuals, of the given variances, (n,)."""
+        return replace(self, errors=replace(self.errors, variance=variance))
 
 
 def modulus_deviation(fit: FitResult) -> float:

@@ -21,8 +21,8 @@ from bushfit.diagnosis.claims import ClaimScreening, claims
 from bushfit.diagnosis.explanations import Explanation
 from bushfit.diagnosis.faulty_parts import FaultyPart, OutlierCluster
 from bushfit.diagnosis.fits import fit_rivals
+from bushfit.diagnosis.group_evidence import GroupEvidence
 from bushfit.diagnosis.hypotheses import Hypothesis, SearchState
-from bushfit.diagnosis.linear_model import GroupEvidence
 from bushfit.diagnosis.priors import BEAM, DOES_NOT_FIT, LOG_ODDS_CUTOFF, NAMED, ODDS, REFITS, ROUNDS
 from bushfit.diagnosis.projected_columns import GroupSet
 from bushfit.diagnosis.propose import Proposal, has_used_parameters, proposals
@@ -96,8 +96,8 @@ class Search:
         self.root = SearchState.of_tests(tests)
         self.proposals = proposals(tests.bare, settings.without, self.base.fixed)
         self._fit_rivals = partial(fit_rivals, fixed=self.base.fixed, bounds=self.data.bounds)
-        self._log_priors = prior_odds([*self.proposals, *tests.columns.explanations])
-        families = {e.family for e in (*self.outlier_clusters, *tests.columns.explanations) if e.kind == "part"}
+        self._log_priors = prior_odds([*self.proposals, *tests.explanations])
+        families = {e.family for e in (*self.outlier_clusters, *tests.explanations) if e.kind == "part"}
         self._meeting_odds = log(ODDS["part"] / max(len(families), 1)) - tests.log_prior
 
     def run(self) -> list[Hypothesis]:
@@ -117,7 +117,7 @@ class Search:
                     effects = self.proposals if is_root else proposals(state.bare, excluded, self.base.fixed)
                 groups = [effect.group for effect in effects if effect.group]
                 evidence = state.weigh([*GroupSet.split(groups, state.columns.errors), *state.columns.sets])
-                explanations = [*(effect for effect in effects if effect.group), *state.columns.explanations]
+                explanations = [*(effect for effect in effects if effect.group), *state.tests.explanations]
                 steps.append(_Step(state, effects, list(zip(explanations, evidence, strict=True))))
                 for explanation, of_explanation in steps[-1].evidence:
                     log_odds = self._log_odds(explanation.kind, explanation.name, depth)

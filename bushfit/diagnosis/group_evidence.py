@@ -1,0 +1,128 @@
+"""Evidence of the tests for columns of residuals with unknown amounts, from their projected inner products.
+
+The equations are in the notes of `linear_model`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import log_ndtr, logsumexp
+
+from bushfit.diagnosis.priors import SIZES
+from bushfit.diagnosis.projected_columns import Batch
+from bushfit.effects.contract import Array
+
+
+@dataclass(frozen=True, eq=False)
+class GroupEvidence:
+    """Evidence of the tests for one explanation of a gap.
+
+    Args:
+        log_evidence: natural log of the marginal likelihood of the tests with the explanation, averaged over the sizes
+            of its amounts and of the rig's errors.
+        size: relative change of |K| due to the explanation, root mean square over the posterior.
+        likeliest: most probable prior standard deviation of the amounts, relative to |K|, one of `priors.SIZES`.
+        with_compound: evidence for the explanation together with a smooth deviation of the rubber from the model's
+            laws; None if no such deviation is considered.
+    """
+
+    log_evidence: float
+    size: float
+    likeliest: float
+    with_compound: GroupEvidence | None = None
+
+    @property
+    def total(self) -> float:
+        """Natural log of the marginal likelihood, summed over compounds with and without a deviation."""
+        if self.with_compound is None:
+            return self.log_evidence
+        return float(np.logaddexp(self.log_evidence, self.with_compound.log_evidence))
+
+
+def posterior(gram: Array, projections: Array) -> tuple[Array, Array, Array, Array]:
+    """Posterior of the amounts of columns that act together, for each prior size in `priors.SIZES`.
+
+    Args:
+        gram: inner products U^T P U of the columns, (..., width, width).
+        projections: inner products U^T P r with the residuals, (..., width).
+
+    Returns:
+        Gain in log evidence, (..., sizes); mean amounts, (..., sizes, width); variances along the eigenvectors of
+        `gram`, (..., sizes, width); and these eigenvectors, (..., width, width).
+    """
+    values, vectors = (gram[..., 0], np.ones_like(gram)) if gram.shape[-1] == 1 else np.linalg.eigh(gram)
+    projections = np.einsum("...ij,...i->...j", vectors, projections)[..., None, :]
+    prior_variance = np.square(SIZES)[:, None]
+    grown = 1.0 + prior_variance * np.maximum(values, 0.0)[..., None, :]
+    variances = prior_variance / grown
+    gain = 0.5 * np.sum(prior_variance * projections**2 / grown - np.log(grown), axis=-1)
+    return gain, -(prior_variance * projections / grown) @ vectors.swapaxes(-1, -2), variances, vectors
+
+
+def largest_gain(gram: Array, projections: Array) -> Array:
+    """Largest gain in log evidence by columns that act together, over the prior sizes `priors.SIZES`.
+
+    Args:
+        gram: inner products U^T P U of the columns, (..., width, width).
+        projections: inner products U^T P r with the residuals, (..., width).
+
+    Returns:
+        Largest gains, (...).
+
+    Notes:
+        The last row of the Cholesky factor of [[1 + v^2 U^T P U, v U^T P r], [., c]] has the squared norm
+        v^2 r^T P U (1 + v^2 U^T P U)^-1 U^T P r. For many columns this is faster than the eigenvalues of `posterior`.
+    """
+    width, gains = gram.shape[-1], list[Array]()
+    bordered = np.zeros((*gram.shape[:-2], width + 1, width + 1))
+    for size in SIZES:
+        bordered[..., :width, :width] = np.eye(width) + size**2 * gram
+        bordered[..., width, :width] = size * projections  # only the lower triangle is read
+        bordered[..., width, width] = 1.0 + size**2 * np.sum(np.square(projections), axis=-1)
+        root = np.linalg.cholesky(bordered)
+        explained = np.sum(np.square(root[..., width, :width]), axis=-1)
+        diagonal = np.einsum("...ii->...i", root)[..., :width]
+        gains.append(0.5 * explained - np.sum(np.log(diagonal), axis=-1))
+    return np.asarray(np.max(gains, axis=0))
+
+
+def block_gains(batch: Batch, projections: Array, gram: Array) -> tuple[Array, Array]:
+    """Gains in log evidence and squared relative changes of |K| of each block, for each prior size of its amounts.
+
+    Args:
+        batch: blocks of columns that act together.
+        projections: inner products U^T P r with the residuals, (cases, blocks, width).
+        gram: inner products U^T P U within the blocks, (cases, blocks, width, width).
+
+    Returns:
+        Gains and squared changes for each of `priors.SIZES`, (cases, blocks, sizes) each.
+    """
+    gain, amounts, variances, _ = posterior(gram, projections)
+    if (signs := batch.signs[:, None]).any():
+        standardised = signs * (amounts / np.sqrt(variances))[..., 0]
+        gain = np.where(signs != 0, gain + np.log(2.0) + log_ndtr(standardised), gain)
+    return gain, np.square(np.abs(amounts @ batch.unit)).max(axis=-1)
+
+
+def average(groups: Array, log_evidence: Array, changes: Array) -> list[GroupEvidence]:
+    """Average the evidence for explanations over noise cases, blocks and prior sizes of the amounts.
+
+    Args:
+        groups: index of the group of each block, ascending, (blocks,).
+        log_evidence: natural log of prior weight times evidence, (cases, blocks, sizes).
+        changes: squared relative change of |K|, (cases, blocks, sizes).
+
+    Returns:
+        Evidence for each group, in order.
+    """
+    first = np.flatnonzero(np.diff(groups, prepend=-1))
+    by_block = logsumexp(log_evidence, axis=0) if len(log_evidence) else np.full(log_evidence.shape[1:], -np.inf)
+    by_size = np.logaddexp.reduceat(by_block, first, axis=0)
+    total, count = logsumexp(by_size, axis=1), np.diff(first, append=len(groups)) * SIZES.size
+    share = np.exp(log_evidence - np.repeat(total, np.diff(first, append=len(groups)))[:, None])
+    squares = np.add.reduceat(np.sum(share * changes, axis=(0, 2)), first)
+    likeliest = SIZES[np.argmax(by_size, axis=1)]
+    values = (total - np.log(count), np.sqrt(squares), likeliest)
+    return [GroupEvidence(*triple) for triple in zip(*(value.tolist() for value in values), strict=True)]
