@@ -115,7 +115,3 @@ def test_a_worker_that_dies_costs_a_second_try(tmp_path, count, once):
     found = list(run_rows(range(100, 100 + count), task, lambda why: why, local_workers(2)))
     assert sorted(found) == [(number, str(2 * (100 + number))) for number in range(count)], "each row once"
     assert len(list(tmp_path.iterdir())) == len(once)
-
-
-def die() -> None:
-    os.kill(os.getpid(), signal.SIGKILL)

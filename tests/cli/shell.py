@@ -9,15 +9,6 @@ from commandline import Done
 #: The paper's tests, in the folder `work`.
 CAMPAIGN = "configs/cmp_15961.toml"
 GEOMETRY = ("--inner-radius", "10 mm", "--outer-radius", "18 mm", "--length", "34 mm")
-#: The paper's rubber, for a simulation.
-RUBBER = """\
-[simulate.parameters]
-mu = "1.09 MPa"
-m = "0.2 MPa*s^alpha"
-alpha = 0.24
-sigma_fmax = "14.6 kPa"
-eps_half = 0.013
-"""
 BUSHING = '[bushing]\nname = "B"\ninner_radius = "10 mm"\nouter_radius = "18 mm"\nlength = "34 mm"\n'
 
 

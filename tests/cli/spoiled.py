@@ -8,133 +8,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from shell import RUBBER
-
-CAMPAIGN = """\
-[bushing]
-name = "Test bushing"
-inner_radius = "10 mm"
-outer_radius = "18 mm"
-length = "34 mm"
-
-[[loops]]
-file = "loop.csv"
-direction = "axial"
-
-[[sweeps]]
-file = "sweep.csv"
-direction = "axial"
-"""
-#: As much again, for keys that the plain campaign does not use.
-MORE = (
-    """
-[fit]
-dynamic_amplitudes = ["0.1 mm"]
-residuals = "complex"
-
-[fit.mu]
-value = "1.1 MPa"
-min = "0.5 MPa"
-max = "3 MPa"
-vary = true
-
-[predict]
-frequencies = { start = "5 Hz", stop = "155 Hz", step = "10 Hz" }
-amplitudes = ["0.1 mm"]
-torsion_amplitudes = ["0.5 deg"]
-directions = ["axial"]
-
-[[specimens]]
-name = "DMA"
-kind = "modulus"
-
-[simulate]
-seed = 1
-repeats = 3
-noise = "0.5 %"
-phase_error = "0.15 deg"
-
-"""
-    + RUBBER
-    + """\
-
-[simulate.effects.inertia]
-mass = "0.1 kg"
-
-[[simulate.loops]]
-direction = "axial"
-amplitude = "1 mm"
-frequency = "0.1 Hz"
-
-[[simulate.sweeps]]
-direction = "axial"
-amplitudes = ["0.1 mm"]
-frequencies = ["5 Hz", "15 Hz"]
-
-[[simulate.sweeps]]
-specimen = "DMA"
-amplitudes = ["0.1 %", "1 %", "5 %"]
-frequencies = ["10 Hz"]
-stepped = "amplitude"
-reached = "2 %"
-
-[[simulate.resonances]]
-direction = "radial"
-mass = "0.25 kg"
-base_acceleration = "0.1 g"
-frequencies = { start = "50 Hz", stop = "500 Hz", step = "10 Hz" }
-"""
-)
-MODEL: dict[str, Any] = {
-    "schema": "bushfit/model/1",
-    "bushing": {"name": "Test bushing", "inner_radius_m": 0.01, "outer_radius_m": 0.018, "length_m": 0.034},
-    "effects": ["elastic", "springpot", "friction"],
-    "parameters": {
-        "mu": {"value": 1.09e6, "unit": "Pa", "stderr": 1e3, "ci95": [1.088e6, 1.092e6], "vary": True},
-        "m": {"value": 2e5, "unit": "Pa*s^alpha", "stderr": None, "ci95": None, "vary": False},
-        "alpha": {"value": 0.24, "unit": "1", "stderr": None, "ci95": None, "vary": False},
-        "sigma_fmax": {"value": 1.46e4, "unit": "Pa", "stderr": None, "ci95": None, "vary": False},
-        "eps_half": {"value": 0.013, "unit": "1", "stderr": None, "ci95": None, "vary": False},
-    },
-    "covariance": {"names": ["mu"], "matrix": [[1e6]]},
-    "fit": {
-        "nrmse": 0.01, "reduced_chi_square": 1.0, "points": 99, "noise": 0.005,
-        "frequency_Hz": [1, 9], "strain": [0.01, 0.1],
-    },
-    "warnings": [],
-    "provenance": {"bushfit": "0.1.0", "inputs": [], "packages": {}},
-}  # fmt: skip
+TABLES = Path(__file__).parents[1] / "files" / "spoiled"
+#: A small campaign, the same with keys that it does not use (more.toml), a model, and tests.
+FILES = {file.name: file.read_text(encoding="utf-8") for file in sorted((TABLES / "inputs").iterdir())}
+FILES["book.XLSX"] = "PK\x03\x04"
+MODEL: dict[str, Any] = json.loads(FILES["model.json"])
 #: The formats that are written without a compiler.
 EXPORT = ("export", "model.json", *(f"--format={name}" for name in ("nastran", "abaqus", "adams", "csv", "xlsx")))
-
-
-def loop(rows: int = 200) -> list[str]:
-    phase = 2.0 * np.pi * np.arange(rows) / 100.0
-    columns = (phase / (0.2 * np.pi), np.sin(phase), 450.0 * np.sin(phase + 0.1))
-    rows = [f"{t:.3f},{d:.5f},{f:.3f}" for t, d, f in zip(*columns, strict=True)]
-    return ["time [s],displacement [mm],force [N]", *rows]
-
-
-def sweep() -> list[str]:
-    rows = [f"{f},{a},{500 + f},0.1{f:03d}" for a in (0.1, 0.2) for f in range(5, 156, 30)]
-    return ["frequency [Hz],amplitude [mm],stiffness [N/mm],loss factor [-]", *rows]
-
-
-def shaker() -> list[str]:
-    """A mass of 0.5 kg on a mount of 1 kN/mm on a shaker."""
-    frequency = np.linspace(50.0, 400.0, 36)
-    ratio = 1.0 / (1.0 - 0.5 * (2.0 * np.pi * frequency) ** 2 / (1e6 * (1.0 + 0.1j)))
-    phase = np.degrees(np.angle(ratio))
-    rows = [f"{f:g},0.1000,{abs(0.1 * t):.4f},{p:.2f}" for f, t, p in zip(frequency, ratio, phase, strict=True)]
-    return ["frequency [Hz],base acceleration [g],mass acceleration [g],phase [deg]", *rows]
-
-
-FILES = {
-    "campaign.toml": CAMPAIGN, "more.toml": CAMPAIGN + MORE, "model.json": json.dumps(MODEL, indent=1),
-    "loop.csv": "\n".join(loop()) + "\n", "sweep.csv": "\n".join(sweep()) + "\n",
-    "shaker.csv": "\n".join(shaker()) + "\n", "book.XLSX": "PK\x03\x04",
-}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -157,7 +37,7 @@ UNWRITTEN: list[tuple[str, str, str, str | bytes, list[str]]] = [
     ("campaign in latin-1", "fit", "campaign.toml", 'name = "Gummi für Tür"'.encode("latin-1"), [
         "campaign.toml, line 1: the file is not UTF-8 text", "iconv -f LATIN1 -t UTF-8 old > new",
     ]),
-    ("campaign of 1 MB", "plan", "campaign.toml", CAMPAIGN + "#" * 1_000_001, ["campaign.toml: the file is too large"]),
+    ("campaign of 1 MB", "plan", "campaign.toml", FILES["campaign.toml"] + "#" * 1_000_001, ["campaign.toml: the file is too large"]),
     ("a key of many parts", "fit", "campaign.toml", ".".join("a" * 5000) + " = 1\n", ["campaign.toml, line 1: the tables are nested too deeply"]),
     ("deep lists", "fit", "campaign.toml", "a = " + "[" * 5000, ["campaign.toml: the tables are nested too deeply"]),
     ("name without end", "predict", "model.json", json.dumps(MODEL).replace("Test", "x" * 5000), ["bushing.name: this value is not understood", "at most 200"]),
@@ -174,7 +54,7 @@ UNWRITTEN: list[tuple[str, str, str, str | bytes, list[str]]] = [
 
 def listed() -> Iterator[Spoiled]:
     """The rows of the tables in tests/files/spoiled; what is wrong with a model is told by `export`, too."""
-    for table in sorted((Path(__file__).parents[1] / "files" / "spoiled").iterdir()):
+    for table in sorted(TABLES.glob("*.toml")):
         for row in tomllib.loads(table.read_text(encoding="utf-8"))["rows"]:
             name, files = row.get("name", f"{row['command']} {row.get('new', '')}"), dict[str, str | bytes | None]()
             if "missing" in row:

@@ -12,7 +12,6 @@ from shell import BUSHING, names, refused
 from bushfit.campaign.campaign import load_campaign
 
 CLEAN = ("data/arm_bushing/loop_axial_1.csv", "data/arm_bushing/sweep_radial.csv")
-ASSUMED = "zero-to-peak is assumed; if they are peak-to-peak, add --amplitude"
 RECORD = "data/cmp_15961_raw/stepped_sine_axial.csv"
 
 

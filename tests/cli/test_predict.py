@@ -207,16 +207,6 @@ def test_a_plan_after_tests_counts_them(bushfit, tmp_path):
         assert reached["planned"] < reached["before"] < 0.05
 
 
-SPECIMENS = """
-specimens = [
-  { name = "two blocks", kind = "shear", area = "772 mm^2", thickness = "6 mm", elements = 2 },
-  { name = "mount", kind = "shear", area = "400 mm^2", thickness = "4 mm" },
-]
-[simulate]
-parameters = { mu = "1.09 MPa", m = "0.2 MPa*s^alpha", alpha = 0.24, sigma_fmax = "14.6 kPa", eps_half = 0.013 }
-"""
-
-
 def test_a_plan_for_targets_stops_once_they_are_met(root, tmp_path):
     """In less than half of the hours, in every direction whose stiffness is asked for, and said; what is not asked for
     is not planned, and tighter targets take longer."""

@@ -160,7 +160,7 @@ def test_a_test_of_another_name_is_refused(root, tmp_path, old, new, problem):
     assert problem in typing(tmp_path)("fit", "c.toml", "-o", "x", status=2).stderr
 
 
-def test_the_axial_formula_of_an_untested_bushing_is_that_of_a_tested_one(shapes, root, tmp_path):
+def test_the_axial_formula_of_an_untested_bushing_is_that_of_a_tested_one(root, tmp_path):
     run = typing(tmp_path)
     run("fit", root / "configs/three_shapes.toml", "--direction", "short", "-o", "m", "--no-plots")
     done = run("predict", "m", "--bushing", "long", "--direction", "axial", "-o", "x", "--no-plots", "-v")

@@ -13,7 +13,7 @@ import pytest
 from bombs import far_apart, workbook
 from commandline import Done, call
 from shell import BUSHING, refused
-from spoiled import CAMPAIGN, FILES, ROWS, Spoiled
+from spoiled import FILES, ROWS, Spoiled
 
 from bushfit.cli import cli
 
@@ -100,7 +100,7 @@ def bounded(folder: Path, *arguments: str, times: int = 1) -> Done:
 def bombed(tmp_path) -> Path:
     for name, content in FILES.items():
         (tmp_path / name).write_text(content)
-    (tmp_path / "book.toml").write_text(CAMPAIGN.replace("loop.csv", "book.xlsx"))
+    (tmp_path / "book.toml").write_text(FILES["campaign.toml"].replace("loop.csv", "book.xlsx"))
     return tmp_path
 
 

@@ -51,11 +51,6 @@ def silent(frequency: Array, amplitude: Array, stepped: Any = "frequency") -> Sw
     return Sweep("silent", Direction.AXIAL, frequency, amplitude, stiffness, stepped=stepped)
 
 
-def grid(levels: Array) -> Sweep:
-    """Four frequencies at each of many levels, without noise."""
-    return silent(np.tile([5.0, 20.0, 60.0, 150.0], levels.size), np.repeat(levels, 4))
-
-
 def off(sweep: Sweep) -> Array:
     return np.asarray(np.log(sweep.stiffness / PAPER.stiffness(Direction.AXIAL, sweep.frequency, sweep.amplitude)))
 

@@ -38,8 +38,6 @@ FREQUENCIES, AMPLITUDES = np.geomspace(5.0, 155.0, 9), np.geomspace(1e-4, 5e-4, 
 STIFFER = 1.06
 #: A term's stiffness, complex [N/m], by frequency [Hz], amplitude [m] and the stiffness without it.
 Added = Callable[[Array, Array, Array], Array]
-#: Campaigns with terms of random phase and powers.
-RANDOM = 30
 
 
 def with_relaxation(campaign: Campaign, size: float = 0.06) -> Campaign:

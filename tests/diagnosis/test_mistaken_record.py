@@ -5,20 +5,15 @@ A sweep in one file, or with a file for each level as many rigs write it, is the
 
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from rigged import SHARED, Tamper, asked, said
 from tries import some
 
-from bushfit.campaign.campaign import load_campaign
-from bushfit.commands.diagnose import diagnose
-from bushfit.diagnosis.record import Diagnosis
 from bushfit.effects.mistakes import MISTAKES
 from bushfit.errors import FitError
 from bushfit.geometry import Bushing, Direction
@@ -112,18 +107,6 @@ def test_what_all_tests_share_is_not_seen_and_not_named(measured):
     campaign = in_kilograms(measured(None, SHARED))
     campaign = on_sweeps(lambda s: replace(s, stiffness=s.stiffness / 9.80665), 0, 1)(campaign)
     assert said(asked(campaign)) == "consistent "
-
-
-def diagnosed(campaign: Path) -> Diagnosis:
-    return diagnose(load_campaign(campaign)).diagnosis
-
-
-def hum(table: pd.DataFrame, name: str) -> None:
-    """4 % at one frequency of the axial sweep, at every amplitude."""
-    if "axial" in name:
-        steps = sorted(set(table["frequency [Hz]"]))
-        size = next(header for header in table if "stiffness" in header)
-        table.loc[table["frequency [Hz]"] == steps[len(steps) // 2], size] *= 1.04
 
 
 def swept(loss: float, direction: Direction = Direction.AXIAL, magnitude: float = 5e5) -> Sweep:

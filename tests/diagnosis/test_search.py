@@ -27,10 +27,8 @@ from rigged import (
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.effects import BASE
-from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.geometry import Bushing, Direction
 from bushfit.model.model import Model
-from bushfit.model.result import Outlier
 from bushfit.simulation.measured import measure
 from bushfit.simulation.undisturbed import undisturbed
 
@@ -120,21 +118,6 @@ def test_hum_is_told_though_its_rows_are_left_out(measured):
     assert diagnosis.where[0].frequency == (65.0, 65.0)
     assert diagnosis.where[0].excess > 3.0
     assert diagnosis.odds.nothing < 0.03
-
-
-@pytest.fixture
-def left(measured, paper_model) -> tuple[PreparedCampaign, Model]:
-    return PreparedCampaign.from_campaign(measured({}, SHARED)), paper_model
-
-
-def at(data: PreparedCampaign, *points: tuple[int, float, int]) -> list[Outlier]:
-    """Outliers of sweeps, by number, at a frequency: and its place among the rows there."""
-    found = []
-    for number, frequency, which in points:
-        sweep = data.sweeps[number]
-        point = np.flatnonzero(sweep.frequency == frequency)[which]
-        found.append(Outlier(sweep.name, None, int(sweep.order[point]) + 1, "stiffness", 8.0))
-    return found
 
 
 @pytest.mark.slow

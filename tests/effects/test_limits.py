@@ -27,7 +27,6 @@ LOOP = History.steady(5e-4 * np.cos(2.0 * np.pi * np.arange(512) / 512), 5.0)
 STARTED = History(5e-4 * np.sin(2.0 * np.pi * np.arange(20480) / 2048), 1.0 / (20.0 * 2048), False, 20.0)
 SLIDERS = {"sigma": 2.5e4, "e_s": 0.015, "spread": 1.3}
 VALUES = {"sigma_fmax": 1.46e4, "eps_half": 1.3e-2}
-X = np.concatenate([np.logspace(-8, 6, 561), [0.025, 0.02565, 0.026, 1.0]])
 
 
 def added(name: str, model: Model = PLAIN, **values: float) -> Model:

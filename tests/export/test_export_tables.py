@@ -57,7 +57,7 @@ NASTY += ["=1+1", "套管"]
 
 
 @pytest.mark.parametrize("name", NASTY)
-def test_decks_and_workbook_hold_the_same_under_any_name(name, named, tmp_path):
+def test_decks_and_workbook_hold_the_same_under_any_name(name, named):
     def content(export_request: ExportRequest) -> tuple[object, ...]:
         texts = {
             file: text.decode("ascii")

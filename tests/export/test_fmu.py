@@ -1,8 +1,6 @@
 """The FMU against the rig: sweeps, loops and random motions in every direction, and each effect that runs in time."""
 
 import importlib.util
-import io
-import zipfile
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +11,6 @@ from fmus import LEVELS, Running, off, request_of, wandering, written
 from bushfit.effects import LIBRARY, Branch, Layer, Level, get_parameter, qualified_name
 from bushfit.effects.contract import Array, RubberConditions
 from bushfit.errors import ModelError, OutputError
-from bushfit.export.contract import Exported
 from bushfit.export.fmu import export
 from bushfit.export.in_time import FIELDS, time_model
 from bushfit.geometry import Bushing, Direction
@@ -165,13 +162,6 @@ def test_another_shape_is_set_by_its_two_numbers(paper, paper_model):
     }
     model = Model(other, paper_model.effects, paper_model.values)
     assert worst(paper, model, "random", values=values) < LARGEST
-
-
-def archive(exported: Exported) -> dict[str, bytes]:
-    """What the one file of an export holds."""
-    ((_, content),) = exported.files.items()
-    with zipfile.ZipFile(io.BytesIO(content)) as opened:
-        return {name: opened.read(name) for name in opened.namelist()}
 
 
 def test_instances_do_not_see_each_other_and_a_state_is_taken_up_again(paper):

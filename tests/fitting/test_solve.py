@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 
 from bushfit.effects import BASE
-from bushfit.fitting.coordinates import Coordinates
 from bushfit.fitting.descent import Descent
 from bushfit.fitting.preparation import MeasuredTest
 from bushfit.fitting.prepared_campaign import PreparedCampaign
@@ -14,15 +13,6 @@ from bushfit.fitting.shared_errors import SharedErrors
 from bushfit.fitting.starts import start_values
 from bushfit.model.model import FIVE, Model
 from tests.fits import residual, solve
-
-#: Campaigns, with the places of their tests.
-TESTS: dict[str, tuple[str, ...] | None] = {
-    "cmp_15961": None,
-    "arm_bushing": None,
-    "mystery_mount": None,
-    "epdm_70": ("DMA", "DMA 2"),
-}
-STARTS = 5
 
 
 @pytest.fixture
@@ -100,11 +90,3 @@ def test_it_ends_where_lmfit_ends(paper_model, data_sets, effects, bounds):
     assert found.chi_square == pytest.approx(known.chisqr, abs=1e-2)
     assert np.max(np.abs(found.point - end) / errors) < 0.05
     assert found.solution.at_bound == problem.at_bound(end)
-
-
-def elsewhere(model: Model, names: list[str], rng: np.random.Generator) -> Model:
-    """The model a decade about its values, each parameter by itself."""
-    coordinates = Coordinates.of_parameters(model, names)
-    point = coordinates.point({name: model.values[name] for name in names})
-    values = coordinates.values(point + rng.uniform(-2.3, 2.3, point.size))
-    return model.with_values({name: np.clip(value, *model.parameters[name].bounds) for name, value in values.items()})

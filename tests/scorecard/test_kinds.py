@@ -9,7 +9,6 @@ import pytest
 from kinds import SIZES, Bench, largest, sized
 from lab_campaign import KINDS, RUBBERS, OtherRubber, a_specimen, campaign
 from rubber_card import evaluate
-from rubber_in_time import StrainHistory
 from time_rig import DIRECTIONS, Bushing, Rubber, Tests, friction, respond
 
 from bushfit import geometry
@@ -17,7 +16,6 @@ from bushfit.effects import BASE
 from bushfit.model.model import Model
 
 RUBBER = Rubber(1.09e6, 2.0e5, 0.24, 1.46e4, 1.3e-2)
-TABLE_1 = Rubber(1.09e6, 2.0e5, 0.24, 1.46e4, 1.3e-2)
 CMP = Bushing(0.010, 0.018, 0.034)
 PHASE = 2.0 * np.pi * np.arange(512) / 512
 
@@ -32,7 +30,7 @@ def a_session() -> Tests:
         for f in np.arange(5.0, 156.0, 10.0)
     ]
     rows = [(0.1, 1e-3, 0, 0, 1, True), *swept]
-    return Tests(Bushing(0.010, 0.018, 0.034), *(np.array(column) for column in zip(*rows, strict=True)))
+    return Tests(CMP, *(np.array(column) for column in zip(*rows, strict=True)))
 
 
 @pytest.mark.parametrize("name", [name for name, kind in KINDS.items() if kind.in_sizes])
@@ -63,7 +61,7 @@ def test_it_measures_the_table_of_the_paper_s_bushing(root):
     table = pd.read_csv(root / "data/reference/stiffness_table1.csv")
     direction, frequency, amplitude, stiffness, loss = (table[name].to_numpy() for name in table.columns)
     places = [DIRECTIONS.index(name) for name in direction]
-    k = respond(points(CMP, frequency, amplitude, places), TABLE_1).stiffness
+    k = respond(points(CMP, frequency, amplitude, places), RUBBER).stiffness
     assert np.max(np.abs(np.abs(k) / stiffness - 1.0)) < 2e-4
     assert np.max(np.abs(k.imag / k.real - loss)) < 2e-4
 
@@ -85,8 +83,7 @@ def test_bushfit_s_closed_form_meets_it(seed):
 
 
 def test_friction_with_further_turns_is_that_walked_from_rest():
-    phase = 2.0 * np.pi * np.arange(512) / 512
-    wave = 0.01 * (np.cos(phase) + 0.5 * np.cos(3.0 * phase))
+    wave = 0.01 * (np.cos(PHASE) + 0.5 * np.cos(3.0 * PHASE))
     largest, half = 2.0e4, 0.008
     turn, turned, before, stress, sense = 0.0, 0.0, 0.0, 0.0, 0.0
     walked = []
@@ -102,10 +99,6 @@ def test_friction_with_further_turns_is_that_walked_from_rest():
         walked.append(stress)
         before = value
     assert np.allclose(friction(wave[None, :], largest, half)[0], walked[-512:], atol=1e-5 * largest)
-
-
-def steady(frequency: float, amplitude: float = 1.0) -> StrainHistory:
-    return StrainHistory(amplitude * np.sin(PHASE)[None, :], np.array([[1.0 / (512 * frequency)]]), periodic=True)
 
 
 @pytest.mark.parametrize("rubber", RUBBERS)

@@ -18,8 +18,6 @@ from bushfit.report.page.comparison import comparison_page
 from bushfit.report.results import Formats, encode_all
 
 NAMES = ["two", "families"]
-#: Keys of compare.json whose texts come from a user's files or names.
-FOREIGN = {"name", "source", "words", "warnings", "command", "file", "note", "part", "reason"}
 #: A batch that is diagnosed and reported takes ten seconds.
 SLOW = pytest.mark.slow
 

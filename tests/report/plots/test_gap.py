@@ -1,4 +1,4 @@
-"""The gap before and after: one scale, right signs and sizes; and the picture of a batch says what is out of limits."""
+"""The figure of the gap before and after: one scale, right signs and sizes."""
 
 from collections.abc import Callable
 from typing import Any
@@ -41,11 +41,6 @@ def maps(figure: Figure) -> list[Axes]:
 def cells(axes: Axes) -> list[PolyCollection]:
     """The coloured cells of a map."""
     return [found for found in axes.collections if type(found) is PolyCollection and found.get_array() is not None]
-
-
-def names(figure: Figure) -> list[str]:
-    """What stands left of the rows."""
-    return [" ".join(axes.get_ylabel().split()) for axes in figure.axes if axes.get_ylabel()]
 
 
 def headings(figure: Figure) -> list[str]:
