@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from commandline import typing
-from shell import BUSHING, RUBBER, document
+from shell import BUSHING, document
 
 SIMULATED = f"""{BUSHING}
 [simulate]
@@ -28,7 +28,13 @@ direction = "axial"
 amplitudes = ["0.1 mm", "0.2 mm", "0.5 mm"]
 frequencies = {{ start = "5 Hz", stop = "155 Hz", step = "10 Hz" }}
 
-{RUBBER}"""
+[simulate.parameters]
+mu = "1.09 MPa"
+m = "0.2 MPa*s^alpha"
+alpha = 0.24
+sigma_fmax = "14.6 kPa"
+eps_half = 0.013
+"""
 
 
 @pytest.fixture(scope="module")
