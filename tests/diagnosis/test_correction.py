@@ -7,7 +7,7 @@ stiffness in the frequency domain.
 
 import json
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -171,18 +171,13 @@ def test_bands_hold_the_truth_whichever_it_is(measured, paper_model):
     assert np.mean(shares) > 0.93
 
 
-def with_stiffness(campaign: Campaign, stiffness: Sequence[Array]) -> Campaign:
-    """The sweeps of a campaign with other stiffness, and no loops."""
-    pairs = zip(campaign.sweeps, stiffness, strict=True)
-    return replace(campaign, sweeps=tuple(replace(sweep, stiffness=k) for sweep, k in pairs), loops=())
-
-
 def with_term(campaign: Campaign, term: Added) -> Campaign:
-    """The sweeps of a campaign with a term in parallel."""
-    added = (term(sweep.frequency, sweep.amplitude, sweep.stiffness) for sweep in campaign.sweeps)
-    return with_stiffness(
-        campaign, [sweep.stiffness + more for sweep, more in zip(campaign.sweeps, added, strict=True)]
+    """The sweeps of a campaign with a term in parallel, and no loops."""
+    added = (
+        replace(sweep, stiffness=sweep.stiffness + term(sweep.frequency, sweep.amplitude, sweep.stiffness))
+        for sweep in campaign.sweeps
     )
+    return replace(campaign, sweeps=tuple(added), loops=())
 
 
 def power_law(size: float, phase_deg: float, p: float, q: float) -> Added:
@@ -191,14 +186,9 @@ def power_law(size: float, phase_deg: float, p: float, q: float) -> Added:
     return lambda frequency, amplitude, _: turn * (frequency / 50.0) ** p * (amplitude / 2e-4) ** q
 
 
-def found_in(campaign: Campaign, fitted: Fitted) -> PowerLaw | None:
-    evidence, data = fitted(campaign), PreparedCampaign.from_campaign(campaign)
-    start = start_values(campaign.bushing, data.sweeps, {})
-    return nearest_power_law(evidence, campaign.rig, start, {})
-
-
-def surely(campaign: Campaign, fitted: Fitted) -> PowerLaw:
-    found = found_in(campaign, fitted)
+def found_in(campaign: Campaign, fitted: Fitted) -> PowerLaw:
+    start = start_values(campaign.bushing, PreparedCampaign.from_campaign(campaign).sweeps, {})
+    found = nearest_power_law(fitted(campaign), campaign.rig, start, {})
     assert found is not None
     return found
 
@@ -216,7 +206,7 @@ def surely(campaign: Campaign, fitted: Fitted) -> PowerLaw:
 )
 def test_laws_are_found_with_their_phase_and_powers(law, words, measured, fitted):
     """Of 3 % of the stiffness, each within three and a half standard errors, and called what they act like."""
-    found = surely(with_term(measured(), power_law(*law)), fitted)
+    found = found_in(with_term(measured(), power_law(*law)), fitted)
     assert found.measure == "stiffness"
     assert found.is_likely
     for (value, low, high), true in zip(

@@ -2,7 +2,6 @@
 which share no formula with it."""
 
 import doctest
-import json
 import pkgutil
 from importlib import import_module
 from itertools import pairwise
@@ -15,7 +14,6 @@ from bushfit import effects, geometry, model, reduction
 from bushfit.effects.contract import Array, Setting
 from bushfit.geometry import Direction
 from bushfit.model.covariance import Z95, Covariance
-from bushfit.model.file import from_document, to_document
 from bushfit.model.model import FIVE
 from bushfit.model.sensitivity import stepped_values, stiffness_and_slopes
 from bushfit.simulation import rig
@@ -112,13 +110,3 @@ def test_intervals(result):
     assert 1.0 <= np.log(high / value) / (Z95 * (result.covariance.stderr("mu") or 0.0) / value) < 1.05
     low, high = result.interval("alpha") or (0.0, 0.0)
     assert (low + high) / 2.0 == pytest.approx(result.model.values["alpha"])
-
-
-def test_there_and_back(result):
-    document = json.loads(json.dumps(to_document(result), allow_nan=False))
-    back = from_document(document)
-    for key in ("model", "fitted", "quality", "measured", "warnings"):
-        assert getattr(back, key) == getattr(result, key)
-    np.testing.assert_array_equal(back.covariance.matrix, result.covariance.matrix)
-    np.testing.assert_array_equal(back.covariance.spread, result.covariance.spread)
-    assert {**to_document(back), "provenance": None} == {**document, "provenance": None}

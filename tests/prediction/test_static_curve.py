@@ -1,7 +1,5 @@
 """Slow motions against the virtual rig: the static curve, and a large motion below a small harmonic."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -10,8 +8,8 @@ from bushfit.errors import ModelError
 from bushfit.geometry import Direction
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
-from bushfit.model.result import CampaignTable, Range, Result, TestTable
-from bushfit.prediction.static_curve import static_curve, static_rate
+from bushfit.model.result import Range, Result
+from bushfit.prediction.static_curve import static_curve
 from bushfit.prediction.stiffness import predict
 from bushfit.prediction.superposed import LargeMotion
 from bushfit.reading.preload import Preload
@@ -93,23 +91,6 @@ def test_about_a_preload_it_is_that_of_the_rig_with_the_whole_elastic_law(paper_
     curve = static_curve(Result(loaded), Direction.AXIAL, reach, RATE, preload=Preload(offset, "m"))
     expected, mean = np.mean(ways, axis=0), curve.mean.value[5:-5]
     np.testing.assert_allclose(mean - mean[45], expected - expected[45], atol=0.005 * np.ptp(expected) / 2.0)
-
-
-def test_the_rate_is_stated_or_that_of_the_slowest_loop(paper_model):
-    loops = [
-        TestTable("fast", "loop", "axial", (1.0, 1.0), (2e-3, 2e-3), "m", 100),
-        TestTable("slow", "loop", "axial", (0.1, 0.1), (1e-3, 1e-3), "m", 100),
-        TestTable("sweep", "sweep", "radial", (0.01, 155.0), (1e-4, 5e-4), "m", 100),
-    ]
-    plain = Result(paper_model)
-    tested = replace(plain, campaign=CampaignTable("a", "a.toml", "0", "bushfit fit", tuple(loops)))
-    strain = [paper_model.unit_strain(place) for place in (Direction.AXIAL, Direction.RADIAL)]
-    assert static_rate(plain, Direction.AXIAL) == pytest.approx(RATE)
-    assert static_rate(plain, Direction.TORSION) == pytest.approx(np.radians(10.0) / 60.0)
-    assert static_rate(tested, Direction.AXIAL) == pytest.approx(4e-4)
-    assert static_rate(tested, Direction.RADIAL) == pytest.approx(4e-4 * strain[0] / strain[1])
-    assert static_rate(tested, Direction.AXIAL, {"m": 1e-5}) == 1e-5
-    assert static_rate(tested, Direction.AXIAL, {"rad": 1e-5}) == pytest.approx(4e-4)
 
 
 def test_a_smooth_correction_changes_the_curve_as_in_a_sine(paper_model):
