@@ -1,96 +1,31 @@
-"""`init` on the files of one laboratory visit, which are simulated: all of them at once make a campaign that fits."""
+"""`init` on the files of one laboratory visit, all of them at once: they make a campaign that fits.
+
+The files in tests/files/visit hold simulated tests of the paper's bushing in the formats of four programs.
+"""
 
 import json
+import shutil
 import tomllib
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
 from shell import GEOMETRY, values
 
 from bushfit.campaign.campaign import load_campaign
-from bushfit.campaign.simulated import SimulatedLoop, SimulatedSweep, SimulateSettings
-from bushfit.geometry import Direction, Specimen
+from bushfit.geometry import Specimen
 from bushfit.model.model import Model
-from bushfit.reading.measurement import Sweep
-from bushfit.simulation.measured import measure
-from bushfit.simulation.undisturbed import undisturbed
 
-FREQUENCIES = tuple(float(f) for f in range(5, 156, 15))
-AMPLITUDES = (5e-5, 1e-4, 2e-4, 5e-4)
-INFO = [
-    ["Prüfbericht", ""], ["Kunde", "Muster AG"], ["Prüftemperatur", "23 °C"], ["Datum", "2024-05-03"],
-    ["Hinweis", "Werte nach 3 Vorzyklen"],
-]  # fmt: skip
-
-
-def write_visit(folder: Path, truth: Model) -> None:
-    """All files of the visit."""
-    loop = SimulatedLoop(Direction.AXIAL, 1e-3, 0.1, cycles=3)
-    sweeps = tuple(SimulatedSweep(place, AMPLITUDES, FREQUENCIES) for place in (Direction.AXIAL, Direction.RADIAL))
-    noise = {"noise": 2e-3, "force_noise": 2e-3, "displacement_noise": 5e-4}
-    plan = SimulateSettings(loops=(loop,), sweeps=sweeps, **noise)
-    clean = undisturbed(truth, plan)
-    first, second, third = (measure(clean, SimulateSettings(**vars(plan) | {"seed": seed})) for seed in range(3))
-    with pd.ExcelWriter(folder / "Buchse 7.xlsx") as book:
-        pd.DataFrame(INFO).to_excel(book, sheet_name="Info", index=False, header=False)
-        for name, sweep in zip(("axial", "radial"), first.sweeps, strict=True):
-            long(sweep).to_excel(book, sheet_name=name, index=False)
-    axial, radial = second.sweeps
-    for level in AMPLITUDES:
-        rows = axial.amplitude == level
-        text = long(axial)[rows].drop(columns="Amplitude [mm]").to_csv(sep=";", decimal=",", index=False)
-        (folder / f"Dyn_axial_A{1e3 * level:g}mm.csv".replace(".", ",", 1)).write_text(text, encoding="cp1252")
-    (folder / "radial wide.csv").write_text(wide(radial), encoding="utf-8")
-    (folder / "MTS_radial.txt").write_text(mts(third.sweeps[1]), encoding="utf-8")
-    (recorded,) = first.loops
-    columns = (recorded.time, 1e3 * recorded.displacement + 1.25, 1e-3 * recorded.force + 0.9)
-    rows = [";".join(f"{value:.6f}".replace(".", ",") for value in row) for row in zip(*columns, strict=True)]
-    head = "Prüfer: 3\nVorkraft: 0,9 kN\n\nZeit;Axialweg;Axialkraft\ns;mm;kN\n"
-    (folder / "Hysterese 0,1Hz.csv").write_text(head + "\n".join(rows) + "\n", encoding="cp1252")
-    (folder / "Notizen.txt").write_text("Mittwoch: Buchse eingebaut.\nDonnerstag: fertig.\n", encoding="utf-8")
-    (folder / "Bild.png").write_bytes(b"\x89PNG")
-    (folder / "alt.xlsx").write_bytes(b"PK\x03\x04 not a workbook")
-    (folder / ".hidden.csv").write_text("x", encoding="utf-8")
-    (folder / "2023").mkdir()
-
-
-def long(sweep: Sweep) -> pd.DataFrame:
-    """A row for each point, with German headers."""
-    return pd.DataFrame(
-        {
-            "Frequenz [Hz]": sweep.frequency,
-            "Amplitude [mm]": np.round(1e3 * sweep.amplitude, 6),
-            "dyn. Steifigkeit [N/mm]": np.round(1e-3 * np.abs(sweep.stiffness), 4),
-            "Verlustfaktor [-]": np.round(sweep.stiffness.imag / sweep.stiffness.real, 6),
-        }
-    )
-
-
-def wide(sweep: Sweep) -> str:
-    """Frequencies down and amplitudes across, a block for stiffness and one for loss side by side."""
-    table = long(sweep)
-    frequency, level, *values = table.columns
-    stiffness, loss = (table.pivot_table(index=frequency, columns=level, values=name) for name in values)
-    names = [f"K* {level:g} mm [N/mm]" for level in stiffness] + [f"tan delta {level:g} mm" for level in loss]
-    return pd.concat((stiffness, loss), axis=1).set_axis(names, axis=1).reset_index().to_csv(index=False)
-
-
-def mts(sweep: Sweep) -> str:
-    """Tabs, a preamble, and amplitudes that count peak-to-peak."""
-    table = long(sweep)
-    table["Amplitude [mm]"] *= 2.0
-    names = ["Frequency (Hz)", "Dynamic Displacement p-p (mm)", "K* (N/mm)", "Tan Delta"]
-    head = "MTS Elastomer\nTest:\tDynamic characterization\nOperator:\t2\nTemperature:\t23.0 deg C\n\n"
-    return head + table.set_axis(names, axis=1).to_csv(sep="\t", index=False)
+#: Set points of the sweeps.
+FREQUENCIES, AMPLITUDES = range(5, 156, 15), (5e-5, 1e-4, 2e-4, 5e-4)
 
 
 @pytest.fixture(scope="module")
-def visited(paper_model, tmp_path_factory) -> Path:
+def visited(tmp_path_factory) -> Path:
+    """A folder with the files of the visit, and one of another year that is empty."""
     folder = tmp_path_factory.mktemp("lab") / "visit"
-    folder.mkdir()
-    write_visit(folder, paper_model)
+    shutil.copytree(Path(__file__).parents[1] / "files" / "visit", folder)
+    (folder / "2023").mkdir()
     return folder
 
 
