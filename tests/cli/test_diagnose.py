@@ -77,6 +77,7 @@ def test_the_document_names_the_effect_with_its_size_and_the_gap_before_and_afte
     usable = written["usable"]
     assert 0.0 < usable["stiffness"] == max(place["stiffness"] for place in usable["places"]) < 0.02
     assert usable["held_out"] is True
+    assert f"expected error {100.0 * usable['stiffness']:.2g} % in stiffness" in done.stderr
 
 
 def test_every_residual_and_every_candidate_is_in_a_table(found):
@@ -141,6 +142,8 @@ def test_look_alikes_are_told_with_their_odds(work, bushfit):
     assert all(
         gap["after"] < 0.5 * gap["before"] for gap in (written["gap"][key] for key in ("calibration", "heldout"))
     )
+    (size,) = written["effects"][0]["parameters"].values()
+    assert (size["unit"], 1e-8 < size["value"] < 4e-8) == ("m/N", True), "of an effect that the model lacks"
     shares = [each["probability"] for each in written["odds"]]
     assert shares == sorted(shares, reverse=True)
     assert 0.97 <= sum(shares) <= 1.0

@@ -4,6 +4,7 @@ The files in tests/files/visit hold simulated tests of the paper's bushing in th
 """
 
 import json
+import re
 import shutil
 import tomllib
 from pathlib import Path
@@ -57,9 +58,12 @@ def test_a_visit_makes_a_campaign_that_fits(typed, visited, tmp_path, table_1, m
     for sweep in radial:
         assert np.unique(sweep.amplitude) == pytest.approx(AMPLITUDES)
         assert np.unique(sweep.frequency) == pytest.approx(FREQUENCIES)
-    monkeypatch.setenv("COLUMNS", "50")
+    monkeypatch.setattr("commandline.WIDTH", "50")
     done = typed("fit", "x/campaign.toml", "-o", "fit", "--no-plots", "--json")
     assert values(done) == pytest.approx(table_1, rel=0.04)
+    assert re.search(
+        r"\nmu\n  value: [\d.]+\n  std error: [\d.]+\n  95 % interval: .* to .*\n  unit: MPa\n", done.stderr
+    )
     assert "and 1 more test has a smaller misfit" in " ".join(done.stderr.split())
     shown = done.stderr.partition("test by test")[2].partition("and 1 more")[0]
     assert ("MTS_radial" in shown, "A0,5mm" in shown) == (True, False), "the largest misfits"

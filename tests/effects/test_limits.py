@@ -12,6 +12,7 @@ from bushfit.effects.dead_zone import first_harmonic
 from bushfit.effects.temperature import log_shift
 from bushfit.geometry import Bushing, Direction
 from bushfit.model.model import Model
+from bushfit.reading.preload import Preload
 from bushfit.units import CELSIUS
 
 PLAIN = Model(
@@ -111,6 +112,16 @@ def test_friction_recovers_after_a_larger_strain():
         )
         np.testing.assert_allclose(stiffness, weak.stiffness(*AXIAL), rtol=1e-12)
     same(broken, PLAIN, 0.0)
+
+
+def test_about_a_preload_a_spring_has_the_first_harmonic_of_the_whole_elastic_law():
+    spring = Model(PLAIN.bushing, ("elastic",), {"mu": 1e6})
+    loaded = added("preload", spring, c2=0.5, c3=8.0)
+    wave, unit_strain = np.cos(2.0 * np.pi * np.arange(64) / 64), PLAIN.unit_strain(Direction.AXIAL)
+    strain = unit_strain * (1e-3 + AMPLITUDE[:, None] * wave)
+    slope = 2.0 * np.mean((strain + 0.5 * strain**2 + 8.0 * strain**3) * wave, axis=1) / (unit_strain * AMPLITUDE)
+    found = loaded.stiffness(*AXIAL, conditions=RubberConditions(preload=Preload(1e-3, "m")))
+    np.testing.assert_allclose(found, slope * spring.stiffness(*AXIAL), rtol=1e-9)
 
 
 def test_a_spring_alone_under_a_force_channel_that_saturates():

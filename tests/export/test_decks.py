@@ -16,7 +16,7 @@ from bushfit.effects.history import History
 from bushfit.errors import ModelError
 from bushfit.export import abaqus, adams, nastran, prony
 from bushfit.export.contract import MM_T_S_N, Exported, ExportRequest, UnitSystem
-from bushfit.export.deck import DOFS, amplitude_levels
+from bushfit.export.deck import DOFS
 from bushfit.geometry import Direction, Specimen
 from bushfit.model.model import Model
 from bushfit.model.result import Result
@@ -55,7 +55,7 @@ def test_every_value_of_the_grid_is_read_back(name, units, export_request, known
         "in lbf*s^2/in s lbf": (1.0 / 4.4482216152605, 1.0 / 0.0254, 1.0),
     }[units]
     _, found = read(name, replace(export_request, units=UnitSystem.parse(units)), tmp_path)
-    ranks = range(1, len(amplitude_levels(export_request)) + 1)
+    ranks = range(1, 6)  # five amplitudes in axial direction, fewer in the others
     assert set(found) == {(dof, rank) for dofs in DOFS.values() for dof in dofs for rank in ranks}
     worst, apart = 0.0, 0.0
     for direction, dofs in DOFS.items():
@@ -147,7 +147,7 @@ def test_stated_constants_are_the_rotations_without_a_law(name, export_request, 
     exported, found = read(name, stated, tmp_path)
     assert {dof for dof, _ in found} == {1, 2, 3, 4, 5, 6}
     for dof in (4, 5):
-        for rank in range(1, len(amplitude_levels(stated)) + 1):
+        for rank in range(1, 6):
             np.testing.assert_allclose(found[dof, rank][1], 1e3 * (60.0 + 6.0j), rtol=DIGITS)
     assert "rotations about x and y: the stated constant, 60 N m/rad, loss factor 0.1" in " ".join(exported.omissions)
     assert "no stiffness in" not in " ".join(exported.omissions)
