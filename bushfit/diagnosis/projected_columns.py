@@ -53,15 +53,18 @@ class RigRows:
         """
         if len(self.rows) > len(other.rows):  # the smaller set is weighted
             return other.inner(self, combinations).swapaxes(1, 2)
-        products = np.empty((len(combinations), len(self.rows), len(other.rows)))
         weights, scatter = self.rig.weights
+        size, products = len(self.rows), np.empty((len(combinations), len(self.rows), len(other.rows)))
         for number in np.unique(scatter[combinations]):
             chosen = scatter[combinations] == number
-            roots = self.rig.roots[0][combinations[chosen]]
-            errors = roots.swapaxes(-1, -2) @ (roots @ self.shared[number])
-            errors = errors.reshape(len(roots), roots.shape[1] * roots.shape[2], len(self.rows)).swapaxes(1, 2)
-            among_errors = errors @ other.shared[number].reshape(errors.shape[-1], len(other.rows))
-            products[chosen] = self.rows * weights[number] @ other.rows.T - among_errors
+            kernels = self.rig.kernels[:, combinations[chosen]]
+            blocks, count, width, _ = kernels.shape
+            errors = kernels.reshape(blocks, count * width, width) @ self.shared[number]
+            errors = errors.reshape(blocks, count, width, size).transpose(1, 3, 0, 2)
+            shared = other.shared[number].reshape(blocks * width, len(other.rows))
+            among_errors = errors.reshape(count * size, blocks * width) @ shared  # in one product, which is fast
+            plain = self.rows * weights[number] @ other.rows.T
+            products[chosen] = plain - among_errors.reshape(count, size, len(other.rows))
         return products
 
 

@@ -144,6 +144,12 @@ class RigErrors:
         log_det -= np.sum(np.log(weights), axis=1)[scatter]
         return np.linalg.inv(root) * errors[..., None, :], log_det
 
+    @cached_property
+    def kernels(self) -> Array:
+        """Products (L^-1 D)^T L^-1 D of the factors in `roots`, (blocks, combinations, w, w)."""
+        roots = self.roots[0].swapaxes(0, 1)
+        return np.asarray(roots.swapaxes(-1, -2) @ roots)
+
 
 def in_scatter_units(fit: FitResult) -> FitResult:
     """Express the residuals of a fit in units of the scatter from point to point, to compare hypotheses.
