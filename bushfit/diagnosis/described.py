@@ -10,6 +10,7 @@ from bushfit.diagnosis.document import Description
 from bushfit.diagnosis.holdout import HoldOut, HoldOutPart
 from bushfit.diagnosis.locate import find_regions
 from bushfit.diagnosis.power_law import nearest_power_law
+from bushfit.diagnosis.priors import LARGEST_REMAINING_SHARE
 from bushfit.effects.contract import Array
 from bushfit.effects.unnamed import NAME, Unnamed
 from bushfit.errors import FitError
@@ -72,19 +73,22 @@ def describe(
         has_candidates: True if known effects explain the gap, so that its form is known.
 
     Returns:
-        The description; None without a valid correction: if it does not reduce the held-out residuals or has an error
-        larger than the gap, if the model has a correction already, or if the first harmonics cannot be fitted.
+        The description; None without a valid correction: if it does not reduce the held-out residuals (a correction
+        with an error larger than the gap: by half of their excess over noise), if the model has a correction already,
+        or if the first harmonics cannot be fitted.
     """
     if NAME in fit.model.effects:
         return None
     description, harmonic = None, tuple(test.fundamental() for test in fit.data_sets)
     fitted, correction = with_model_error(fit, bounds, rig, certain=True)
-    if correction is None or correction.uncertainty >= 1.0:
+    if correction is None:
         return None
     plain = replace(fitted, noise_weighted=())  # residuals of the tests with their noise alone
     closest = plain.reevaluate(fitted.model, harmonic)
     beside_effects = _hold_out_inside(fit, closest, correction)
-    if (beside_effects.after or 0.0) >= (beside_effects.before or np.inf):
+    excess = [(value or 1.0) - 1.0 for value in (beside_effects.before, beside_effects.after)]
+    remaining_share = LARGEST_REMAINING_SHARE if correction.uncertainty >= 1.0 else 1.0
+    if beside_effects.parts and max(excess[1], 0.0) > remaining_share * excess[0]:
         return None
     half = Z95 * correction.uncertainty * correction.largest
     sentence = f"up to {number(100.0 * correction.largest, 2)} ± {number(100.0 * half, 2)} % of |K|"

@@ -42,3 +42,6 @@ LEAST_NAMED_SHARE = 0.9
 DOES_NOT_FIT = 0.002
 #: Largest held-out root mean square residual, in units of noise, of a closed gap: noise alone gives 1.1.
 LARGEST_CLOSED_GAP = 1.2
+#: Largest excess of the held-out residuals over noise with a smooth correction whose error is larger than the gap,
+#: relative to the excess without it.
+LARGEST_REMAINING_SHARE = 0.5
