@@ -240,6 +240,22 @@ def test_one_loop_alone_is_fitted_and_what_it_leaves_open_is_said_first(own, tmp
     assert "expected error" not in ran.stderr + fitted.stderr, "five parameters pass through one point"
 
 
+def test_a_preload_without_influence_is_not_determined(own, tmp_path):
+    """The effect is asked for, but the last of three repeats, at another preload, is like those before it."""
+    table = pd.read_csv(own / SWEEP)
+    table[table["repeat"] == 3].to_csv((own / SWEEP).with_name("loaded.csv"), index=False)
+    table[table["repeat"] < 3].to_csv(own / SWEEP, index=False)
+    text = (own / CAMPAIGN).read_text(encoding="utf-8").partition("[[loops]]")[0]
+    for file, preload in ((SWEEP, "0 N"), (SWEEP.replace("sweep_axial", "loaded"), "500 N")):
+        text += f'[[sweeps]]\nfile = "../{file}"\ndirection = "axial"\npreload = "{preload}"\n'
+    (own / CAMPAIGN).write_text(f'{text}[fit]\neffects = ["preload"]\n', encoding="utf-8")
+    unknown = "the tests do not determine preload (95 % interval of +-100 % or more)"
+    for command in ("fit", "diagnose"):
+        done = typing(own)(command, CAMPAIGN, "-o", tmp_path / command, "--no-plots")
+        assert unknown in done.stderr.splitlines()[0]
+        assert unknown in document(tmp_path / command / "model.json")["warnings"]
+
+
 @pytest.mark.parametrize(
     ("directions", "hidden", "sets"),
     [
