@@ -100,6 +100,7 @@ def print_diagnosis(output: Output, diagnosed: DiagnosisOutput) -> None:
 def print_verdict(output: Output, diagnosed: DiagnosisOutput, action: str = "") -> None:
     """Print the verdict of a diagnosis, the next step (`action`), a summary, and probabilities of missing effects."""
     from bushfit.diagnosis.record import format_odds
+    from bushfit.effects.unnamed import NAME as UNNAMED
 
     colour = _COLOURS.get(diagnosed.headline, "yellow")
     output.print_headline(diagnosed.data.campaign.name, diagnosed.headline, action, f"bold {colour}")
@@ -108,6 +109,10 @@ def print_verdict(output: Output, diagnosed: DiagnosisOutput, action: str = "") 
     if diagnosed.adopt:
         cause = "the first" if diagnosed.diagnosis.verdict == "ambiguous" else "this"
         output.print(f"  if you know that {cause} is the cause: {diagnosed.adopt}")
+    if diagnosed.diagnosis.verdict == "ambiguous" and diagnosed.diagnosis.added:
+        before, after = diagnosed.diagnosis.before.model.effects, diagnosed.result.model.effects
+        added = ("a smooth correction" if name == UNNAMED else name for name in after if name not in before)
+        output.print(f"  if not, use model.json: it adds {' and '.join(added)}, and its bands include all explanations")
 
 
 def print_findings(output: Output, diagnosed: DiagnosisOutput) -> None:
