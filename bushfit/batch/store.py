@@ -1,15 +1,14 @@
 """Folder of a row: its result files and `row.json`, whose hashes show whether the files are still valid.
 
 Notes:
-    `row.json` is removed first and written last. If a process is killed, or a crash of the machine damages a file,
-    `row.json` is missing or a hash does not match, and the row is evaluated again.
+    `row.json` is written last. If a process is killed, or a crash of the machine damages a file, `row.json` is missing
+    or a hash does not match, and the row is evaluated again.
 """
 
 import contextlib
 import hashlib
 import json
 import os
-import shutil
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import asdict
 from pathlib import Path
@@ -80,9 +79,9 @@ def save_row(output: Path, row: Row, files: Mapping[str, bytes], record: RowFile
     """
     folder = output / ROWS_FOLDER / row.folder
     document = json.dumps(to_json_data(record, RowFile), separators=(",", ":")).encode() + b"\n"
-    (folder / ROW_FILE).unlink(missing_ok=True)
-    shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(exist_ok=True)
+    for earlier in filter(Path.is_file, folder.iterdir()):
+        earlier.unlink(missing_ok=True)  # a worker that was given up for lost may write the same row
     for name, content in {**files, ROW_FILE: document}.items():
         (folder / name).write_bytes(content)
 
