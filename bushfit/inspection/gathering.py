@@ -21,7 +21,6 @@ from bushfit.inspection.labels import count_temperatures
 from bushfit.inspection.opening import inspect_file
 from bushfit.inspection.recognition import open_table, recognize_table
 from bushfit.inspection.record import Inspection
-from bushfit.reading.blocks import CONDITIONS
 from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS
 from bushfit.reading.instruments import word_for_part
 from bushfit.reading.labelled import same_text
@@ -30,6 +29,7 @@ from bushfit.reading.levels import split_conditions
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.reading.names import NO_LABELS, Labels, labels_above, labels_in_names
 from bushfit.reading.parts import open_file
+from bushfit.reading.roles import CONDITIONS
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from bushfit.reading.headers import COUNTED, SWEEP_COLUMNS, Vocabulary, split_un
 from bushfit.reading.layout import WITH_UNIT, Layout, Line, is_comment, is_row, is_summary_row, is_units_row
 from bushfit.reading.names import NO_LABELS, Labels, labels_above, labels_in_names, named_direction
 from bushfit.reading.numerals import is_like_number, plainest_value
-from bushfit.reading.roles import PAIRS
+from bushfit.reading.roles import CONDITIONS
 from bushfit.reading.source import Channels, RowSource, Sheet, Text, cells_of
 
 #: Largest text that is searched for blocks without their own headers [bytes]; chosen: some 100,000 rows.
@@ -24,10 +24,6 @@ _NUMERIC = b"0123456789.,+-eEdD \t\r\n"
 _COMPLEX = re.compile(
     r"\(?\s*([+-]?[\d.,]+(?:[eEdD][+-]?\d+)?)\s*([+-]\s*[\d.,]+(?:[eEdD][+-]?\d+)?)\s*\*?\s*[ij]\s*\)?"
 )
-#: Roles of conditions, whose levels belong to different tests.
-CONDITIONS = ("temperature", "preload")
-#: Roles of columns that every operating point fills.
-_OF_POINTS = {role for pair in PAIRS for role in pair}
 #: Names of the runs of a test, in the titles of blocks.
 _RUNS = Vocabulary({"repeat": SWEEP_COLUMNS["repeat"]})
 #: First rows that are searched for complex numbers and units; chosen: room for remarks.
@@ -86,7 +82,6 @@ def combined(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> tuple
     """
     if isinstance(source, Channels) or len(layout.headers) < 2 or layout.headerless:
         return source, layout
-    source, layout = _filled_down(source, layout, vocabulary)
     sides = _find_sides(layout)
     if sides and (blocks := _side_by_side(source, layout, sides)):
         shared = slice(0, sides[0].start)
@@ -111,42 +106,6 @@ def combined(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> tuple
     head = [line for line in source.head() if line.number < layout.header_line]
     above = [line for line in head if not labels_above([line]).quantities]  # those of a block are in its rows
     return _with_plain_cells(Sheet(source.sheet or "", content, above=above, numbers=numbers), layout)
-
-
-def _filled_down(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> tuple[RowSource, Layout]:
-    """Repeat levels, such as amplitudes, that a table states only in the first of several rows.
-
-    Returns:
-        Source with filled cells, without rows that contain only the levels, and layout with a note; both unchanged if
-        no column of a condition or stepped quantity has more empty cells than numbers below a first number.
-    """
-    roles = [heading.role if header and (heading := vocabulary.heading(header)) else "" for header in layout.headers]
-
-    def is_point(cells: Sequence[str | float]) -> bool:
-        """True for a row with a stiffness or its loss, unlike rows of a waveform and rows that contain only a level."""
-        return any(cell != "" and role in _OF_POINTS for cell, role in zip(cells, roles, strict=False))
-
-    below = (line for line in source.head() if line.number > layout.lines_before_data)
-    rows = [[*cells_of(line, layout.delimiter), *[""] * len(roles)] for line in below]
-    points, levels = list(filter(is_point, rows)), set[int]()
-    for index in (n for n, role in enumerate(roles) if role in ("amplitude", "frequency", *CONDITIONS)):
-        if points and rows[0][index] != "" and 2 * sum(row[index] != "" for row in points) <= len(points):
-            levels.add(index)
-    if not levels:
-        return source, layout
-    numbers, content, before = list[int](), list[Sequence[str | float]](), dict[int, str | float]()
-    for line in source.lines(layout.lines_before_data):
-        cells = list(cells_of(line, layout.delimiter))
-        before |= {index: cells[index] for index in levels if index < len(cells) and is_like_number(str(cells[index]))}
-        if is_point(cells):
-            cells = [before.get(n, "") if cell == "" and n in levels else cell for n, cell in enumerate(cells)]
-        if any(cell != "" for n, cell in enumerate(cells) if n not in levels or not is_like_number(str(cell))):
-            content.append(cells)
-            numbers.append(line.number)
-    names = ", ".join(f'"{layout.headers[index]}"' for index in sorted(levels))
-    note = f"{names}: an empty cell has the value of the cell above"
-    head = [line for line in source.head() if line.number < layout.header_line]
-    return Sheet(source.sheet or "", content, above=head, numbers=numbers), replace(layout, notes=(*layout.notes, note))
 
 
 def exchange_rows(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> Sheet | None:

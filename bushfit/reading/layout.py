@@ -20,6 +20,7 @@ from pydantic import BeforeValidator
 from bushfit import units
 from bushfit.reading.headers import WORDS, Vocabulary, plain, split_convention, split_unit
 from bushfit.reading.numerals import is_like_number
+from bushfit.reading.roles import CONDITIONS, PAIRS
 
 #: First words of rows that summarise others.
 _SUMMARIES = frozenset(map(plain, WORDS["rows_of"]["summary"]))
@@ -43,6 +44,8 @@ _LONGEST_HEADER = 10_000
 #: Non-empty lines below a header that are searched for its units row and first numbers; chosen: room for comments.
 _LINES_BELOW_HEADER = 8
 _DIGIT = re.compile(r"\d")
+#: Roles of columns that every operating point fills, and of columns that may be filled once for several.
+_OF_POINTS, _LEVELS = {role for pair in PAIRS for role in pair}, ("frequency", "amplitude", *CONDITIONS)
 _COMMENT_SIGNS = ("#", "%", "//")
 #: A number with a number sign: "#1".
 _NUMBERED = re.compile(r"#\s?\d+\b")
@@ -112,7 +115,8 @@ class Layout:
         written: original header cells of a wide table that name a quantity; `headers` belong to the long table.
         numbered: True if all rows begin with a number after a # ("#1"), so that # does not mark a comment.
         headerless: True if the table has no header.
-        notes: sentences on columns that are left out.
+        notes: sentences on columns that are left out or filled.
+        levels: indices of columns, such as the amplitude, that are empty if they have the value of the row above.
     """
 
     delimiter: str
@@ -124,6 +128,7 @@ class Layout:
     numbered: bool = False
     headerless: bool = False
     notes: tuple[str, ...] = ()
+    levels: frozenset[int] = frozenset()
 
     @property
     def lines_before_data(self) -> int:
@@ -357,7 +362,25 @@ def _layout(
     numbered = bool(contents) and all(
         _NUMBERED.match(next(filter(None, split(content, delimiter)), "")) for content in contents
     )
-    return Layout(delimiter, tuple(headers), number, tuple(row), units_line, numbered=numbered)
+    levels = _stated_once(headers, [split(content, delimiter) for content in contents], vocabulary)
+    names = ", ".join(f'"{headers[index]}"' for index in sorted(levels))
+    notes = (f"{names}: an empty cell has the value of the cell above",) if levels else ()
+    return Layout(
+        delimiter, tuple(headers), number, tuple(row), units_line, numbered=numbered, notes=notes, levels=levels
+    )
+
+
+def _stated_once(headers: Sequence[str], rows: Sequence[Sequence[str]], vocabulary: Vocabulary) -> frozenset[int]:
+    """Indices of columns of a sweep that are filled only in the first of several rows, as an amplitude may be.
+
+    Rows count only if they have a stiffness or its loss; rows of waveforms do not.
+    """
+    roles = [heading.role if header and (heading := vocabulary.heading(header)) else "" for header in headers]
+    points = [row for row in rows if any(cell and role in _OF_POINTS for cell, role in zip(row, roles, strict=False))]
+    counts = {
+        n: sum(len(row) > n and row[n] != "" for row in points) for n, role in enumerate(roles) if role in _LEVELS
+    }
+    return frozenset(index for index, count in counts.items() if points and 2 * count <= len(points))
 
 
 def _below_headers(header: str, row: str) -> list[str]:

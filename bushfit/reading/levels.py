@@ -8,11 +8,11 @@ from numpy.typing import NDArray
 
 from bushfit.errors import UnitError
 from bushfit.geometry import Direction, Motion
-from bushfit.reading.blocks import CONDITIONS
 from bushfit.reading.headers import Column
 from bushfit.reading.labelled import column_texts
 from bushfit.reading.measurement import SAME_TEMPERATURE, Floats
 from bushfit.reading.numerals import Numerals
+from bushfit.reading.roles import CONDITIONS
 from bushfit.reading.runs import group_rows
 from bushfit.reading.si_columns import si_column
 from bushfit.reading.table import Table

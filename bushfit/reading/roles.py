@@ -13,6 +13,8 @@ OF_MOTION = (*_STRAINING, "amplitude_reached", "force_amplitude", "damping_coeff
 AGREEING_PAIRS = [(size, loss) for size, loss in map(str.split, WORDS["sets"]["agreeing"])]
 #: All pairs of columns that determine a complex stiffness, in order of preference.
 PAIRS = AGREEING_PAIRS + [(size, loss) for size, loss in map(str.split, WORDS["sets"]["stiffness"])]
+#: Roles of conditions, whose levels belong to different tests.
+CONDITIONS = ("temperature", "preload")
 #: SI unit, or the attribute of a motion that is the SI unit, by role; all other roles are ratios.
 _UNITS = {role: unit for unit, roles in WORDS["si_units"].items() for role in roles}
 

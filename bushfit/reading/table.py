@@ -142,12 +142,18 @@ class Table:
         Yields:
             Line number, cells, and the reason why the row is not data (see `row_fault`); None for a row of data.
         """
+        level = dict[int, str | float]()
         try:
             for line in (block or self.source).lines(self.layout.lines_before_data):
                 if self.layout.numbered or not is_comment(line.content, self.layout.delimiter):
                     cells = cells_of(line, self.layout.delimiter)
                     if any(cell != "" for cell in cells):
                         cells = [*cells, *[""] * (len(self.headers) - len(cells))]
+                        if levels := self.layout.levels:
+                            level |= {index: cells[index] for index in levels if is_like_number(str(cells[index]))}
+                            if all(index in levels for index, cell in enumerate(cells) if cell != ""):
+                                continue
+                            cells = [level.get(n, "") if cell == "" else cell for n, cell in enumerate(cells)]
                         yield line.number, cells, row_fault(self, cells)
         except csv.Error as error:
             raise self.error("the table cannot be read", found=str(error)) from error

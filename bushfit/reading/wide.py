@@ -18,10 +18,11 @@ from typing import NamedTuple
 
 from bushfit import units
 from bushfit.errors import MeasurementError
-from bushfit.reading.blocks import CONDITIONS, find_segments
+from bushfit.reading.blocks import find_segments
 from bushfit.reading.headers import COUNTED, AmplitudeConvention, Vocabulary, split_convention
 from bushfit.reading.layout import Layout, Line, is_comment, is_row, is_summary_row
 from bushfit.reading.numerals import is_like_number, plainest_value
+from bushfit.reading.roles import CONDITIONS
 from bushfit.reading.source import RowSource, Sheet, cells_of
 
 #: Roles of the two stepped quantities: one varies down the rows and the other across the columns.
