@@ -11,8 +11,8 @@ from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.reading.measurement import Sweep
 
-#: Largest number of steps to a sweep's individual shift factor, and largest step [neper]: a few are enough.
-_STEPS, _LARGEST = 10, 2.0
+#: Tolerance of the fit of a sweep's individual shift factor, far below its error.
+_ACCURACY = 1e-12
 #: Step of ln frequency for slopes.
 _APART = 1e-3
 #: Frequencies from which on a sweep can be shifted along them.
@@ -96,19 +96,19 @@ def _further_shift(model: Model, sweep: MeasuredSweep) -> tuple[float, float]:
     Returns:
         Addition to the model's ln a_T, and its standard error; nan if the stiffness does not change with frequency.
 
-    Notes:
-        Gauss-Newton with equal weights, because the residuals are mostly not noise.
+    Notes: least squares with equal weights, because the residuals are mostly not noise.
     """
-    shift, place, conditions = 0.0, sweep.direction, sweep.conditions
+    from scipy.optimize import least_squares  # slow to import
 
-    def over_measured(shift: float) -> Array:
+    place, conditions = sweep.direction, sweep.conditions
+
+    def difference(shift: Array) -> Array:
+        """Difference between shifted model and measurement relative to the measurement, real then imaginary parts."""
         frequency = sweep.frequency * np.exp(shift)
-        return model.stiffness(place, frequency, sweep.amplitude, conditions=conditions) / sweep.measured
+        ratio = model.stiffness(place, frequency, sweep.amplitude, conditions=conditions) / sweep.measured
+        return np.concatenate((ratio.real - 1.0, ratio.imag))
 
-    for _ in range(_STEPS):
-        slope = (over_measured(shift + _APART) - over_measured(shift - _APART)) / (2.0 * _APART)
-        remainder, size = over_measured(shift) - 1.0, float(np.linalg.norm(slope))
-        if not size:
-            return np.nan, np.nan
-        shift -= float(np.clip(np.vdot(slope, remainder).real / size**2, -_LARGEST, _LARGEST))
-    return shift, float(np.linalg.norm(remainder) / np.sqrt(max(2 * remainder.size - 1, 1)) / size)
+    fit = least_squares(difference, 0.0, xtol=_ACCURACY, ftol=_ACCURACY, gtol=_ACCURACY)
+    if not (size := float(np.linalg.norm(np.asarray(fit.jac)))):
+        return np.nan, np.nan
+    return float(fit.x.item()), float(np.linalg.norm(fit.fun) / np.sqrt(fit.fun.size - 1.0) / size)

@@ -197,7 +197,7 @@ class MeasuredLoop(MeasuredBase):
         """Force of a model at the n rows, (..., n) [N or N m]; see `MeasuredBase`."""
         if values is None and (force := self.recall("response", model)) is not None:
             return force
-        stack = model.stack(model.setting(self.direction, "loop", self.conditions), values)
+        stack = model.stack(self.direction, "loop", self.conditions, values)
         force = self.interpolate_at_rows(stack.force(self.history(model.is_transient))) + (self.datum or 0.0)
         return force if values is not None else self.keep("response", model, force)
 

@@ -162,7 +162,7 @@ class MeasuredSweep(MeasuredBase):
         """Stiffness of a model at the points of the sweep, (..., n) [N/m or N m/rad]; see `MeasuredBase`."""
         if values is None and (stiffness := self.recall("response", model)) is not None:
             return stiffness
-        stack = model.stack(model.setting(self.direction, "sweep", self.conditions), values)
+        stack = model.stack(self.direction, "sweep", self.conditions, values)
         stiffness = stack(2.0 * np.pi * self.frequency, self.reached)
         return stiffness if values is not None else self.keep("response", model, stiffness)
 

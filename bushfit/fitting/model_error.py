@@ -42,7 +42,8 @@ from bushfit.fitting.discrepancy import (
     discrepancies,
 )
 from bushfit.fitting.levels import LevelErrors, level_error_columns, level_errors
-from bushfit.fitting.preparation import MeasuredLoop, MeasuredSweep, MeasuredTest, residual_slices, split_by_kind
+from bushfit.fitting.noise import SweepNoise
+from bushfit.fitting.preparation import MeasuredLoop, MeasuredTest, residual_slices, split_by_kind, with_sweep_noise
 from bushfit.fitting.problem import FitProblem, FitResult, SmoothError
 from bushfit.fitting.rig_class import UNSTATED_LEVEL, class_errors, format_class_errors, largest_error
 from bushfit.fitting.shared_errors import SharedErrors
@@ -297,17 +298,14 @@ def _with_unseen_level_errors(tests: Sequence[MeasuredTest], rig: RigSettings) -
 
     A smooth error of the model follows these errors from level to level, and is uncertain by them.
     """
-    noises, expected = {}, class_errors(rig, UNSTATED_LEVEL)
-    for sweep in split_by_kind(tests)[1]:
-        if sweep.noise.origin == "repeats":
-            gain, phase = np.maximum(expected, sweep.noise.level).tolist()
-            noises[id(sweep.noise)] = replace(sweep.noise, level=(gain, phase))
-    return [
-        replace(test, noise=noises[id(test.noise)])
-        if isinstance(test, MeasuredSweep) and id(test.noise) in noises
-        else test
-        for test in tests
-    ]
+
+    def with_level(noise: SweepNoise) -> SweepNoise:
+        if noise.origin != "repeats":
+            return noise
+        gain, phase = np.maximum(class_errors(rig, UNSTATED_LEVEL), noise.level).tolist()
+        return replace(noise, level=(gain, phase))
+
+    return with_sweep_noise(tests, with_level)
 
 
 def _errors_of_class(test: MeasuredTest, rig: RigSettings) -> Array:

@@ -1,7 +1,8 @@
 """Tests prepared for a fit, one per measured loop and one per sweep; and simulated tests for planning."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import accumulate, pairwise
 from typing import TypeVar
 
@@ -145,9 +146,19 @@ def with_level_errors(tests: Sequence[MeasuredTest], error: tuple[float, float],
         error: standard deviation of gain and of phase [rad].
         freedom: degrees of freedom behind the error; 0 if it is exact.
     """
-    noises = {id(test.noise): test.noise for test in tests if isinstance(test, MeasuredSweep)}
-    noises = {key: replace(noise, level=error, level_freedom=freedom) for key, noise in noises.items()}
-    return [replace(test, noise=noises[id(test.noise)]) if isinstance(test, MeasuredSweep) else test for test in tests]
+    return with_sweep_noise(tests, partial(replace, level=error, level_freedom=freedom))
+
+
+def with_sweep_noise(tests: Sequence[MeasuredTest], change: Callable[[SweepNoise], SweepNoise]) -> list[MeasuredTest]:
+    """Return tests whose sweeps have a changed noise; sweeps that share one noise share the changed noise.
+
+    Args:
+        tests: loops, which are unchanged, and sweeps.
+        change: function from the noise of sweeps to the changed noise.
+    """
+    noises = {id(sweep.noise): sweep.noise for sweep in split_by_kind(tests)[1]}
+    changed = {key: change(noise) for key, noise in noises.items()}
+    return [replace(test, noise=changed[id(test.noise)]) if isinstance(test, MeasuredSweep) else test for test in tests]
 
 
 def split_by_kind(data_sets: Iterable[MeasuredTest]) -> tuple[list[MeasuredLoop], list[MeasuredSweep]]:
@@ -179,9 +190,8 @@ def log_slopes(model: Model, data_set: MeasuredTest, names: Sequence[str]) -> Ar
         names: names of the parameters.
     """
     values, steps = stepped_values(model, names, data_set.direction)
-    stack = model.stack(model.setting(data_set.direction, data_set.kind, data_set.conditions), values)
-    response = stack(2.0 * np.pi * data_set.frequency, data_set.amplitude)
-    stiffness, slopes = difference_quotients(response, steps)
+    stack = model.stack(data_set.direction, data_set.kind, data_set.conditions, values)
+    stiffness, slopes = difference_quotients(stack(2.0 * np.pi * data_set.frequency, data_set.amplitude), steps)
     return slopes / stiffness
 
 

@@ -299,7 +299,7 @@ class Model:
         amplitude = np.asarray(amplitude, dtype=float)
         if omega.shape != amplitude.shape:
             omega, amplitude = np.broadcast_arrays(omega, amplitude)
-        stack = self.stack(self.setting(direction, kind, conditions), values)
+        stack = self.stack(direction, kind, conditions, values)
         stiffness = stack(np.atleast_1d(omega), np.atleast_1d(amplitude))
         return stiffness if omega.ndim else stiffness[..., 0]
 
@@ -328,7 +328,7 @@ class Model:
         >>> round(float(paper.force("axial", motion).max()), 1)
         458.1
         """
-        return self.stack(self.setting(direction, kind, conditions), values).force(displacement)
+        return self.stack(direction, kind, conditions, values).force(displacement)
 
     def setting(self, place: Place | str, kind: Kind = "sweep", conditions: RubberConditions = UNKNOWN) -> Setting:
         """Collect the properties of a test that its response depends on.
@@ -344,14 +344,22 @@ class Model:
         direction = Direction(place) if isinstance(place, str) else place
         return Setting(self.bushing, direction, kind, conditions, self.unnamed)
 
-    def stack(self, setting: Setting, values: Values | None = None) -> Stack:
+    def stack(
+        self,
+        place: Place | str,
+        kind: Kind = "sweep",
+        conditions: RubberConditions = UNKNOWN,
+        values: Values | None = None,
+    ) -> Stack:
         """Rubber and layers (effects around it, such as the rig's) that act in a test, to evaluate stiffness and force.
 
         Args:
-            setting: direction, kind and conditions of the test.
+            place: direction or specimen, or the name of a direction.
+            kind: kind of test, "loop" or "sweep".
+            conditions: temperature and strain history of the rubber in the test.
             values: parameter values [SI] in place of those of the model.
         """
-        values = self.values if values is None else values
+        setting, values = self.setting(place, kind, conditions), self.values if values is None else values
         return Stack(self, setting, values, acting_layers(self, setting, values))
 
     def values_at(

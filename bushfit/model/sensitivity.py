@@ -50,7 +50,7 @@ def stiffness_and_slopes(
     array([[0.3634+0.j]])
     """
     values, steps = stepped_values(model, names, direction)
-    stack = model.stack(model.setting(direction, kind, conditions), values)
+    stack = model.stack(direction, kind, conditions, values)
     return difference_quotients(stack(2.0 * np.pi * frequency, amplitude), steps)
 
 
@@ -70,7 +70,7 @@ def force_and_slopes(
         Force [N or N m], (n,), and its derivatives per SI unit of each parameter, (k, n).
     """
     values, steps = stepped_values(model, names, direction)
-    stack = model.stack(model.setting(direction, "loop", conditions), values)
+    stack = model.stack(direction, "loop", conditions, values)
     return difference_quotients(stack.force(displacement), steps)
 
 
