@@ -100,7 +100,8 @@ class DiagnosisWriter:
         first, verdict = self.first, self.finding.verdict
         if first is None:
             return self._build(Closing(self._with_free_gains(self.search.base)), _NOTHING)
-        if verdict in ("named", "partly") and first.best.claim:
+        mistakes = {composition.best.claim and composition.best.claim.key for composition in self.finding.reported}
+        if verdict in ("named", "partly", "ambiguous") and first.best.claim and len(mistakes) == 1:
             return self._mistaken_record(first)
         closing = self._close_gap(first)
         if verdict in ("named", "partly"):
@@ -141,9 +142,9 @@ class DiagnosisWriter:
             The fit, and the covariance of the amounts that were fixed; None if all were fitted.
         """
         base, bounds, names = self.search.base, self.search.data.bounds, self.finding.names
-        if not names:
-            return base, None
         refitted = [h for h in self.hypotheses if h.refitted and not h.claim and set(h.effects) >= set(names)]
+        if not names or not refitted:
+            return base, None
         if not first.unnamed:
             state = min((h.state for h in refitted), key=lambda state: len(state.effects) > len(names))
             model = state.fit.model.without(*{*state.effects} - {*names})
@@ -211,6 +212,8 @@ class DiagnosisWriter:
         command, corrections = f"bushfit diagnose CAMPAIGN {claim.options}", "; ".join(claim.corrections)
         advice = f"if the records of the tests confirm this mistake, state {corrections} (or {command})"
         summary = f"these tests agree if {claim.sentence}"
+        if self.finding.verdict == "ambiguous":
+            summary += "; correct this first: the tests do not decide yet what else is missing"
         after = self._with_free_gains(best.state.plain)
         closing = Closing(base, holdout=hold_out(base, after, self.search.data.bounds))
         diagnosis = self._build(closing, summary, self._record_entries(first), places=best, next_test=advice)
