@@ -107,8 +107,7 @@ def print_verdict(output: Output, diagnosed: DiagnosisOutput, action: str = "") 
     for line in (diagnosed.diagnosis.summary, *format_odds(diagnosed.document)):
         output.console.print(f"  {escape(line)}")
     if diagnosed.adopt:
-        cause = "the first" if diagnosed.diagnosis.verdict == "ambiguous" else "this"
-        output.print(f"  if you know that {cause} is the cause: {diagnosed.adopt}")
+        output.print(f"  {diagnosed.adopt}")
     if diagnosed.diagnosis.verdict == "ambiguous" and diagnosed.diagnosis.added:
         before, after = diagnosed.diagnosis.before.model.effects, diagnosed.result.model.effects
         added = ("a smooth correction" if name == UNNAMED else name for name in after if name not in before)

@@ -14,6 +14,7 @@ from bushfit.commands.provenance import campaign_document, option_words, result_
 from bushfit.commands.respond import validation_files
 from bushfit.diagnosis import workflow
 from bushfit.diagnosis.document import DiagnosisFile
+from bushfit.diagnosis.next_test import MEASURE_AGAIN
 from bushfit.diagnosis.record import Diagnosis, DiagnosisSettings, level_of
 from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.errors import FitError, quote_path
@@ -36,6 +37,7 @@ class DiagnosisOutput:
         data: the campaign, prepared for a fit.
         diagnosis: the diagnosis.
         document: content of diagnosis.json.
+        command: command with its options that repeats the diagnosis.
         files: documents, tables, figure and page.
         validations: comparisons of the model to use with the validation records of the campaign.
         validations_before: comparisons of the joint fit without the added effects; empty if none were added.
@@ -44,6 +46,7 @@ class DiagnosisOutput:
     data: PreparedCampaign
     diagnosis: Diagnosis
     document: DiagnosisFile
+    command: str
     files: Sequence[ResultFile]
     validations: Sequence[Validation] = ()
     validations_before: Sequence[Validation] = ()
@@ -59,16 +62,18 @@ class DiagnosisOutput:
 
     @property
     def adopt(self) -> str:
-        """Command that diagnoses the campaign with the named causes adopted.
+        """Advice with the command that diagnoses the campaign with the named causes adopted, beside those before.
 
-        It is "" without such a cause, and if the only thing it would add is in the model already and certain: effects
-        of a verdict "named" that are no mistake and have no twin.
+        It is "" without such a cause, if the only thing it would add is in the model already and certain (effects of a
+        verdict "named" that are no mistake and have no twin), and if a part of the tests has to be measured again.
         """
+        if self.diagnosis.next_test.startswith(MEASURE_AGAIN):
+            return ""
         causes = [entry for entry in self.diagnosis.effects if entry.name != UNNAMED]
         if self.diagnosis.verdict == "named" and not any(level_of(e.name) in ("record", "unresolved") for e in causes):
             return ""
-        options = "".join(f" --adopt {entry.label}" for entry in causes)
-        return options and f"bushfit diagnose {_printed_path(self.data.campaign)}{options}"
+        labels = [entry.label for entry in causes]
+        return f"if {' and '.join(labels)} is confirmed: {' --adopt '.join([self.command, *labels])}" if labels else ""
 
     @property
     def result(self) -> Result:
@@ -109,14 +114,18 @@ def diagnose(
     unresolved = [name for name in start.unresolved if name not in adopt] if start else []
     settings = DiagnosisSettings(max_effects, tolerance, tuple(adopt), tuple(without), tuple(unresolved))
     _require_free_parameter(data, start.model if start else None, settings)
-    diagnosis = _with_commands(workflow.diagnose(data, start.model if start else None, settings), data.campaign)
+    numbers = {"max_effects": max_effects, "tolerance": tolerance}
+    changed = {key: f"{number:g}" for key, number in numbers.items() if number != getattr(DiagnosisSettings, key)}
+    options = option_words(model="MODEL.json" if start else None, adopt=adopt, without=without, **changed)
+    path = _printed_path(data.campaign)
+    command = " ".join(["bushfit diagnose", path, *options])
+    diagnosis = workflow.diagnose(data, start.model if start else None, settings)
+    if data.campaign.path.suffix == ".toml":
+        diagnosis = _with_commands(diagnosis, path, command, can_plan=not (start or adopt))
     if not (diagnosis.changed or start or adopt):  # the model to use is that of fit
         plain = (joint or fit(data)).result
         plain = replace(plain, warnings=tuple(line.removesuffix(NEXT) for line in plain.warnings))
         diagnosis = replace(diagnosis, result=diagnosis.odds.averaged(plain))
-    numbers = {"max_effects": max_effects, "tolerance": tolerance}
-    changed = {key: f"{number:g}" for key, number in numbers.items() if number != getattr(DiagnosisSettings, key)}
-    options = option_words(model="MODEL.json" if start else None, adopt=adopt, without=without, **changed)
     document = diagnosis.to_document()
     origin = campaign_document(data, "diagnose", options)
     records = data.campaign.validation
@@ -145,7 +154,7 @@ def diagnose(
     ]
     files += validation_files(validations, before, title)
     files.append(ResultFile("report", "page", partial(report_page, files)))
-    return DiagnosisOutput(data, diagnosis, document, files, validations, before)
+    return DiagnosisOutput(data, diagnosis, document, command, files, validations, before)
 
 
 def _require_free_parameter(data: PreparedCampaign, model: Model | None, settings: DiagnosisSettings) -> None:
@@ -172,18 +181,21 @@ def _printed_path(campaign: Campaign) -> str:
     return quote_path(Path(campaign.path.name) if campaign.path.is_absolute() else campaign.path)
 
 
-def _with_commands(diagnosis: Diagnosis, campaign: Campaign) -> Diagnosis:
-    """Complete the commands in the texts of a diagnosis: path of the campaign, and a plan that separates candidates.
+def _with_commands(diagnosis: Diagnosis, path: str, command: str, *, can_plan: bool) -> Diagnosis:
+    """Complete the commands in the texts of a diagnosis, and add one that plans tests to separate its candidates.
 
     Args:
         diagnosis: the diagnosis.
-        campaign: campaign of the diagnosis; if it is not from a file, the diagnosis is returned unchanged.
+        path: path of the campaign.
+        command: command with all its options that repeats the diagnosis.
+        can_plan: True if `bushfit plan` would start from the same model and tests: nothing was adopted.
     """
-    if campaign.path.suffix != ".toml":
-        return diagnosis
-    path, next_test = _printed_path(campaign), diagnosis.next_test
-    if sets := undecided_effects(diagnosis):
+    next_test = diagnosis.next_test
+    if can_plan and (sets := undecided_effects(diagnosis)):
         next_test += f"; bushfit plan CAMPAIGN --rivals {','.join(sets[0])} selects tests that distinguish them"
-    warnings = tuple(line.replace("CAMPAIGN", path) for line in diagnosis.result.warnings)
-    result = replace(diagnosis.result, warnings=warnings)
-    return replace(diagnosis, next_test=next_test.replace("CAMPAIGN", path), result=result)
+
+    def complete(text: str) -> str:
+        return text.replace("bushfit diagnose CAMPAIGN", command).replace("CAMPAIGN", path)
+
+    result = replace(diagnosis.result, warnings=tuple(map(complete, diagnosis.result.warnings)))
+    return replace(diagnosis, next_test=complete(next_test), result=result)

@@ -17,6 +17,8 @@ from bushfit.model.model import Model
 
 #: Reason for a candidate that is not part of the explanation.
 _LESS_LIKELY = "another explanation is more probable"
+#: Reason for an effect of the most probable explanation that is not named: the deviation of the compound includes it.
+_LEAD = "reduces the gap; a smooth deviation of the compound, which is also present, may have the same cause"
 
 
 def probability_text(composition: Composition, finding: Finding) -> str:
@@ -31,7 +33,8 @@ def undecided_text(reported: Sequence[Composition]) -> str:
     parts = [composition.label.split(" + ") for composition in reported]
     shared = [name for name in parts[0] if all(name in names for names in parts)]
     *labels, last = (" + ".join(name for name in names if name not in shared) or "nothing else" for names in parts)
-    sentence = f"these tests cannot distinguish between {', '.join(labels)} and {last}"
+    rivals = f"{', '.join(labels)} and {last}".replace("fault: ", "a fault of ")
+    sentence = f"these tests cannot distinguish between {rivals}"
     return f"{sentence}; all probable explanations also contain {' and '.join(shared)}" if shared else sentence
 
 
@@ -119,7 +122,9 @@ def list_candidates(
             candidates.append(CandidateResult(name, proposal.score, None, probability[name], {}, why))
             continue
         values = {key: value for key, value in after.model.values.items() if key not in base.model.values}
-        why = "part of the most probable explanation" if first and name in first.names else _LESS_LIKELY
+        why = _LESS_LIKELY
+        if first and name in first.best.effects:
+            why = "part of the most probable explanation" if name in first.names else _LEAD
         gain = base.chi_square - after.chi_square
         candidates.append(CandidateResult(name, proposal.score, gain, probability[name], values, why))
     return sorted(candidates, key=lambda candidate: -candidate.score)

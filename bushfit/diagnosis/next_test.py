@@ -30,6 +30,9 @@ _ROTATION = 0.02
 _EMPTY, _SPRING, _DUMMY = 1e-9, 1.0, 300.0
 _LARGEST_MODULUS = 9e8
 
+#: Start of the next test if a part of the tests is at fault.
+MEASURE_AGAIN = "measure again: "
+
 
 @dataclass(frozen=True)
 class NextTest:

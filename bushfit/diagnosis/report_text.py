@@ -24,13 +24,14 @@ from bushfit.diagnosis.fits import fit_model, result_of
 from bushfit.diagnosis.holdout import HoldOut, hold_out
 from bushfit.diagnosis.hypotheses import Hypothesis, mean_parameters
 from bushfit.diagnosis.locate import find_regions
-from bushfit.diagnosis.next_test import deciding_test
+from bushfit.diagnosis.next_test import MEASURE_AGAIN, deciding_test
 from bushfit.diagnosis.priors import LARGEST_CLOSED_GAP, NAMED
 from bushfit.diagnosis.record import Diagnosis, NamedCause
 from bushfit.diagnosis.rig_shares import with_rig_alternatives
 from bushfit.diagnosis.search import Search
 from bushfit.diagnosis.verdict import LEVELS, NAMELESS, Composition, Finding, decide_verdict
 from bushfit.effects import get_effect, qualified_name
+from bushfit.effects.mistakes import get_mistake
 from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.fitting.preparation import split_by_kind, with_gain_weighting
 from bushfit.fitting.problem import FitResult
@@ -178,16 +179,19 @@ class DiagnosisWriter:
         why = f"lowers chi-square by {base.chi_square - fit.chi_square:.0f}"
         why += " with the other named effects" * (len(names) > 1)
         entries = [NamedCause(name, f"{why}; {probability_text(first, self.finding)}") for name in names]
-        summary = f"{' and '.join(names)} {verbs[0]} the gap"
+        summary, advice = f"{' and '.join(names)} {verbs[0]} the gap", ""
         if self.finding.verdict == "partly":
             excess = [max(fitted.mean_square - 1.0, 0.0) for fitted in (base, fit)]
             share = 100.0 * (1.0 - excess[1] / excess[0]) if excess[0] else 100.0
             part = f"{number(share, 2)} %" if share >= 1.0 else "part"
             summary = f"{' and '.join(names)} {verbs[1]} {part} of the gap"
+            if share < 50.0:  # the next test is for the larger part
+                advice = _LEVELS_ADVICE if first.best.levels else get_effect(UNNAMED).confirmed_by
             entries += [NamedCause(UNNAMED, gap.evidence)] if gap else []
         rest = [part.name for part in first.faulty_parts] + [LEVELS] * first.best.levels
         rest += [f"{NAMELESS} ({gap.sentence})" if gap else NAMELESS] * bool(gap or first.unnamed)
-        return self._build(closing, summary, entries, rest, places=first.best if first.faulty_parts else None)
+        faulty = first.best if first.faulty_parts else None
+        return self._build(closing, summary, entries, rest, places=faulty, next_test=advice)
 
     def _revised_finding(self, diagnosis: Diagnosis, holdout: HoldOut | None) -> Finding | None:
         """New verdict if intervals or held-out tests contradict the named effects; else None.
@@ -242,9 +246,15 @@ class DiagnosisWriter:
         """Diagnosis of a gap that no known effect explains: a smooth correction, or the tests to measure again."""
         gap, candidates = closing.gap, self._candidates
         advice = self._deciding_advice(candidates[0] if candidates else first)
+        if leads := [f"--adopt {name}" for name in self.finding.leads if get_mistake(name) is None]:
+            advice = "; ".join(filter(None, (advice, f"bushfit diagnose CAMPAIGN {' '.join(leads)} fits the leads")))
         at_fault = " and ".join(part.name for part in first.best.faulty_parts)
         if gap:
-            sentences = [f"a smooth correction closes the gap: {gap.sentence}", *causes_text(candidates, self.finding)]
+            before, after = (fit.mean_square**0.5 for fit in (self.search.base, gap.after))
+            closes = "closes the gap"
+            if after > max(LARGEST_CLOSED_GAP, 0.1 * before):
+                closes = f"reduces the gap to {number(after, 2)} times the noise"
+            sentences = [f"a smooth correction {closes}: {gap.sentence}", *causes_text(candidates, self.finding)]
             sentences += [f"it is largest at {at_fault}"] if at_fault else []
         elif at_fault:
             sentences = [f"measure again first: {at_fault}; all other tests disagree with this part"]
@@ -337,7 +347,7 @@ class DiagnosisWriter:
         at_fault = [part.region(base.residual, places.change) for part in faulty_parts] if places else []
         where = tuple(sorted((*at_fault, *regions), key=lambda region: -region.excess))
         if faulty_parts:
-            next_test = f"measure again: {faulty_parts[0].name}"
+            next_test = MEASURE_AGAIN + faulty_parts[0].name
         elif not next_test and entries:
             next_test = get_effect(entries[0].name).confirmed_by
         fitted = result_of(

@@ -23,7 +23,7 @@ from bushfit.effects.contract import Level
 _Part = tuple[str, Any]
 _FAULT = "fault: "
 #: Texts for the parts of an explanation that are no known effect.
-NAMELESS = "something without a name"
+NAMELESS = "an unknown cause"
 LEVELS = "errors of levels beyond the class of the rig"
 
 

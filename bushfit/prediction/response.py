@@ -228,7 +228,7 @@ def _warnings(result: Result, response: TimeResponse, left_out: list[str], tempe
     if (result.model.unnamed or result.model_error) and "friction" in result.model.effects:
         warnings.append(
             f"{place}: friction laws that agree in sines can differ in a mixed motion by more than the band. Compare "
-            "with a fit with --effect distributed_sliders, or with a [[validation]] record"
+            "with a fit with --effect distributed_sliders, or with a measured force ([[validation]])"
         )
     if left_out:
         warnings.append(f"{place}: {' and '.join(left_out)} left out, because no law describes this motion")

@@ -34,6 +34,7 @@ from bushfit.prediction.caveats import (
 from bushfit.prediction.superposed import LargeMotion, superposed_stiffness_and_slopes, timed_candidates
 from bushfit.reading.preload import SAME_PRELOAD, Preload, add_preload
 from bushfit.reading.runs import nominal
+from bushfit.units import number
 
 #: Predicted quantities.
 _BANDS = ("stiffness", "loss_factor", "storage_stiffness", "loss_stiffness")
@@ -188,8 +189,11 @@ def point_warnings(
     rig = rig_effects(result)
     if rig and measured is not None and not np.isnan(measured).all():
         percent = format_deviation(stiffness / np.abs(measured))
+        loss_difference = prediction.loss_factor.value - measured.imag / measured.real
+        ends = [number(end, 2, "+") for end in (np.nanmin(loss_difference), np.nanmax(loss_difference))]
         yield (
-            f"{place}: without {' and '.join(rig)} the predicted stiffness is {percent} compared with the measured one"
+            f"{place}: without {' and '.join(rig)} the predicted stiffness is {percent}, and the predicted loss factor "
+            f"{' to '.join(ends)}, compared with the measured values"
         )
     if prediction.if_rigs and not np.allclose(prediction.if_rigs.stiffness.value, stiffness, rtol=_SAME):
         percent = format_deviation(prediction.if_rigs.stiffness.value / stiffness)

@@ -27,7 +27,7 @@ class ParameterRow(NamedTuple):
         state: "held" (fixed in the fit), "tied", "prior", "at min" or "at max" (at a bound); empty otherwise.
         value: value in `unit`.
         error: standard error in `unit`; "fixed" if the parameter is tied to a constant; empty if it is not known.
-        interval: 95 % interval in `unit`, such as "1.02 to 1.10" or "1.02 to open"; empty if it is not known.
+        interval: 95 % interval in `unit`, such as "1.02 to 1.10" or "open to 1.10"; empty if it is not known.
         unit: display unit that value, error and interval share.
         meaning: description of the parameter.
     """
@@ -61,17 +61,19 @@ def parameter_rows(result: Result) -> Iterator[ParameterRow]:
         interval = result.profile.get(name) or result.interval(name)
         if parameter.log and value <= _BOUND_RATIO * parameter.bounds[0]:  # no standard error at a bound
             stderr = interval = None
-        elif interval == parameter.bounds or stderr == 0.0:
+        elif stderr == 0.0:
             interval = None
         digits, (unit, factor) = _PLAIN_DIGITS, display_unit(parameter.unit, 1.0, value)
         if stderr and value:  # two significant digits of the standard error
             carried = math.floor(math.log10(abs(value))) - math.floor(math.log10(stderr)) + 2
             digits = min(max(carried, _FEWEST_DIGITS), _MOST_DIGITS)
+        if interval == parameter.bounds:
+            interval = (None, None)
         finite_ends = [end * factor for end in interval or () if end is not None]
         value_text, *texts = format_aligned([value * factor, *finite_ends], digits, minimum_digits=2)
         ends = ["open" if end is None else texts.pop(0) for end in interval or ()]
         error = "fixed" * (stderr == 0.0) if not stderr else format_aligned([stderr * factor], 2)[0]
-        state = "prior" if name in result.priors else "held" * (name not in result.fitted)
+        state = "prior" if name in result.priors else "held" * (name not in result.fitted and not stderr)
         state = "tied" if name in result.ties else state
         state = f"at {result.at_bound[name]}" if name in result.at_bound else state
         yield ParameterRow(name, state, value_text, error, " to ".join(ends), unit, parameter.meaning)

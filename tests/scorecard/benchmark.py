@@ -21,6 +21,7 @@ from scipy.stats import binomtest
 
 from bushfit.campaign.campaign import load_campaign
 from bushfit.commands.diagnose import diagnose
+from bushfit.diagnosis.next_test import MEASURE_AGAIN
 from bushfit.effects import LIBRARY
 from bushfit.effects.mistakes import MISTAKES
 from bushfit.errors import BushfitError
@@ -39,8 +40,6 @@ _ANSWERS, _VOCABULARY = "answers.json", "vocabulary.csv"
 ToolAnswer = dict[str, Any]
 #: Places at fault, by the words in which bushfit reports them.
 _PLACES = {"repeat": "repeat", "loop": "loop", "level": "level", "frequency": " Hz", "direction": ""}
-#: Advice of bushfit where a place is surely at fault.
-_AGAIN = "measure again: "
 FOLDER = click.argument("folder", type=click.Path(path_type=Path))
 
 
@@ -109,8 +108,8 @@ def ask_bushfit(folder: Path) -> ToolAnswer:
         claims = [[effect["name"], *effect["alternatives"]] for effect in effects] or [
             [*diagnosed.diagnosis.odds.labels]
         ]
-    elif document["next_test"].startswith(_AGAIN):
-        claims = [[f"fault: {document['next_test'].removeprefix(_AGAIN)}"]]
+    elif document["next_test"].startswith(MEASURE_AGAIN):
+        claims = [[f"fault: {document['next_test'].removeprefix(MEASURE_AGAIN)}"]]
     claims = [[" + ".join(map(_vocabulary_name, name.split(" + "))) for name in claim] for claim in claims]
     where = [
         {key: region[key] for key in ("direction", "frequency_Hz", "amplitude_mm")}
