@@ -190,8 +190,7 @@ def note_not_understood(
         labels: columns that assign rows to tests, see `find_labels`.
         rows: indices of the rows that were read, (n,); None for all.
         settled: frequency and nominal amplitude of these rows, (n,) each; none for a loop. Numbers that are constant at
-            each operating point or count its rows, and texts that are constant at each frequency or amplitude, need no
-            sentence.
+            each operating point, and texts that are constant at each frequency or amplitude, need no sentence.
 
     Yields:
         One sentence for each such column.
@@ -211,13 +210,10 @@ def note_not_understood(
         present, number, counts = np.unique(codes, return_inverse=True, return_counts=True)
         depends_on = [settled] if is_number else [(quantity,) for quantity in settled]
         explained = any(all(np.ptp(number[group]) == 0 for group in group_rows(*keys)) for keys in depends_on)
-        if is_number and settled:  # the numbers of the repeats of each point
-            order = np.arange(counts.size)
-            explained |= all(np.array_equal(number[group], order) for group in group_rows(*settled))
         if counts.size > 1 and not explained and not (is_number and counts.min() < _FEWEST_ROWS):
             values = sorted(texts.distinct[code] for code in present)
             listed = ", ".join(values[:4]) + ", ..." * (len(values) > 4)
             yield (
                 f'"{header}" (column {index + 1}) varies from row to row ({listed}) and is not understood: all '
-                f'rows are one test. To select rows, write rows = {{ "{header}" = "{values[0]}" }} in the campaign'
+                f'rows are one test, with equal points as repeats. To select rows, write rows = {{ "{header}" = "{values[0]}" }} in the campaign'
             )

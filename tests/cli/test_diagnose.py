@@ -133,7 +133,8 @@ def test_a_clean_campaign(bushfit, tmp_path):
 
 def test_look_alikes_are_told_with_their_odds(work, bushfit):
     """And with what closes the gap meanwhile; the page says what the terminal says."""
-    run = bushfit("diagnose", "case_003/bushing.toml", "-o", "alike", "--no-plots")
+    run = bushfit("diagnose", "case_003/bushing.toml", "--without", "force_offset", "-o", "alike", "--no-plots")
+    assert "bushfit diagnose case_003/bushing.toml --without force_offset --adopt sleeve_compliance" in run.stderr
     written = document(work / "alike/diagnosis.json")
     assert written["verdict"] == "ambiguous"
     assert written["summary"].startswith("these tests cannot distinguish between ")

@@ -114,11 +114,13 @@ def test_temperatures_and_preloads_are_tests_of_their_own(typed, points, tmp_pat
     refused(typed("fit", "c.toml", "-o", "y", status=2), tmp_path / "y", f"tests at several {plural}", stated[0])
 
 
-@pytest.mark.parametrize(("ending", "delimiter"), [("csv", ","), ("csv", ";"), ("xlsx", "")])
-def test_runs_are_repeats(typed, points, tmp_path, ending, delimiter):
+@pytest.mark.parametrize(
+    ("ending", "delimiter", "header"), [("csv", ",", "Run"), ("csv", ";", "Rep."), ("xlsx", "", "Versuch Nr.")]
+)
+def test_runs_are_repeats(typed, points, tmp_path, ending, delimiter, header):
     """A row that begins with #1 is no comment where all do."""
     rows = [(f"#{run}", *row[:2], row[2] * (1.0 + run / 1e3), row[3]) for run in (1, 2, 3) for row in points["axial"]]
-    export(tmp_path / f"axial.{ending}", ("Run", *HEADERS), rows, delimiter)
+    export(tmp_path / f"axial.{ending}", (header, *HEADERS), rows, delimiter)
     (seen,) = json.loads(typed("inspect", f"axial.{ending}", "-o", "x", "--json", "--no-plots").stdout)["files"]
     assert seen["facts"]["repeats"] == "3"
     assert not [sentence for sentence in seen["odd"] if "not understood" in sentence]
