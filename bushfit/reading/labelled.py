@@ -214,6 +214,7 @@ def note_not_understood(
             values = sorted(texts.distinct[code] for code in present)
             listed = ", ".join(values[:4]) + ", ..." * (len(values) > 4)
             yield (
-                f'"{header}" (column {index + 1}) varies from row to row ({listed}) and is not understood: all '
-                f'rows are one test, with equal points as repeats. To select rows, write rows = {{ "{header}" = "{values[0]}" }} in the campaign'
+                f'"{header}" (column {index + 1}) varies from row to row ({listed}) and is not understood: all rows '
+                "are one test, with equal points as repeats. To select rows, write "
+                f'rows = {{ "{header}" = "{values[0]}" }} in the campaign'
             )
