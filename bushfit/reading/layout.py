@@ -198,9 +198,18 @@ def find_layout(
     before = [index for index in range(end) if header_line in (None, lines[index].number)]
     if header_line is not None and not before:
         before = [index for index, line in enumerate(lines) if line.number == header_line]
-    candidates = _candidates(lines, before, delimiters, vocabulary)
+    candidates = list(_candidates(lines, before, delimiters, vocabulary))
     best = max(candidates, key=lambda candidate: candidate[0], default=None)
-    return _layout(lines, vocabulary, *(best[1:] if best else _likeliest(lines, before, end, delimiters)))
+    if best is None:
+        return _layout(lines, vocabulary, *_likeliest(lines, before, end, delimiters))
+    # the same header above a block of one or two rows is the first
+    _, last, delimiter, headers = best
+    roles = vocabulary.roles(headers)
+    for _, index, mark, cells in candidates:
+        is_same = mark == delimiter and len(cells) == len(headers) and vocabulary.roles(cells) == roles
+        if is_same and any(is_row(split(line.content, delimiter)) for line in lines[index + 1 : last]):
+            return _layout(lines, vocabulary, index, delimiter, cells)
+    return _layout(lines, vocabulary, last, delimiter, headers)
 
 
 def _candidates(
