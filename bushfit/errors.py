@@ -60,17 +60,18 @@ class BushfitError(Exception):
 
 
 @contextmanager
-def error_location(file: Path | None = None, place: str | None = None) -> Iterator[None]:
-    """Context that adds a file and a place to errors raised inside it.
+def error_location(file: Path | None = None, place: str | None = None, hint: str | None = None) -> Iterator[None]:
+    """Context that adds a file, a place and a next step to errors raised inside it.
 
     Args:
         file: replaces the file of the error, unless None.
         place: replaces the place of the error, unless None.
+        hint: next step for errors without one.
     """
     try:
         yield
     except BushfitError as error:
-        error.file, error.place = file or error.file, place or error.place
+        error.file, error.place, error.hint = file or error.file, place or error.place, error.hint or hint
         raise
 
 

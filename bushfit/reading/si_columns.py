@@ -104,7 +104,8 @@ def si_column(table: Table, role: str, tested: Place, hint: str | None = None) -
         )
     if role == "amplitude" and units.is_compatible(unit, "m/s^2") and expected == "m":
         return replace(column, role="acceleration", scale=units.si_factor(unit, "m/s^2"))
-    with error_location(table.file, place):
+    next_step = None if units.is_unit(unit) else f'state the unit: units = {{ {role} = "{example}" }} in the campaign'
+    with error_location(table.file, place, next_step):
         if expected == "Hz" and is_angular(column.header, unit):
             per_second = "rad/s" if units.is_compatible(unit, "rad/s") else "Hz"
             return replace(column, scale=units.si_factor(unit, per_second) / (2.0 * math.pi))
