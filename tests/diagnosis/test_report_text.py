@@ -15,13 +15,16 @@ from rigged import SHARED, asked, said
 from bushfit.diagnosis.explanations import Explanation
 from bushfit.diagnosis.hypotheses import Hypothesis
 from bushfit.diagnosis.next_test import BUSHING_TESTS, FIXTURE_TESTS, deciding_test, remaining_entropy
+from bushfit.diagnosis.record import Odds
 from bushfit.diagnosis.verdict import Finding, decide_verdict
 from bushfit.effects import BASE
 from bushfit.effects.mistakes import MISTAKES
 from bushfit.fitting.preparation import MeasuredTest, planned_sweep
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.geometry import Direction, Specimen
+from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
+from bushfit.model.result import Result
 
 #: 3 % of give in the axial direction, 17 % in the radial, measured at a few frequencies.
 SOFT_RIG = {"rig_compliance": {"compliance": 4e-8}}
@@ -192,6 +195,14 @@ def test_verdicts(odds, verdict, expected):
     assert finding.nothing == pytest.approx(odds.get("", 0.0))
     if verdict == "ambiguous":  # what all have is certain, whatever else there is
         assert {*finding.names} == set.intersection(*({*name.split("+")} for name in odds)) - {"unnamed"}
+
+
+def test_other_explanations_widen_the_uncertainty_by_their_probability(paper_model):
+    covariance = Covariance(("mu",), np.array([[1e8]]))
+    other = paper_model.with_values({"mu": paper_model.values["mu"] + 1e4})
+    odds = Odds(0.4, (("one", 0.7), ("other", 0.3)), (None, (other, covariance)))
+    widened = odds.averaged(Result(paper_model, ("mu",), covariance)).covariance
+    assert widened.stderr("mu") == pytest.approx(1e4 * np.sqrt(1.0 + 0.6 * 0.3))
 
 
 def test_what_changes_less_than_the_tolerance_is_nothing():

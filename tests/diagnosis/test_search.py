@@ -3,6 +3,7 @@
 Points left out that meet at one frequency tell of a disturbance there; points that go wrong singly do not.
 """
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -62,7 +63,7 @@ def test_what_one_place_alone_shows_is_to_be_measured_again(measured, tamper, pl
     assert said(diagnosis) == "unexplained "
     assert diagnosis.after is diagnosis.before
     assert place in diagnosis.summary
-    assert place in diagnosis.where[0].reading
+    assert re.match(rf"{re.escape(place)}: a deviation of [\d.]+ % from all other tests", diagnosis.where[0].reading)
     assert diagnosis.next_test == f"measure again: {place}"
     assert diagnosis.odds.labels[0] == f"fault: {place}"
 

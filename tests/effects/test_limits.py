@@ -101,6 +101,16 @@ def test_mullins_softens_below_the_largest_strain_so_far_and_not_there():
     same(softened, PLAIN, 0.0)
 
 
+def test_changes_of_one_parameter_by_two_conditions_multiply():
+    strain = np.full(3, 2.0 * AMPLITUDE.max() * PLAIN.unit_strain(Direction.AXIAL))
+    conditions = RubberConditions(33.0 + CELSIUS, largest_strain=strain)
+    warm, soft = added("temperature", softening=3e-3, shift=0.03), added("mullins_levels", share=0.2)
+    both = added("mullins_levels", warm, share=0.2)
+    mu = [model.values_at("axial", 5.0, 1e-4, conditions.select(0))["mu"] for model in (PLAIN, warm, soft, both)]
+    assert mu[3] / mu[0] == pytest.approx(mu[1] / mu[0] * mu[2] / mu[0], rel=1e-12)
+    assert min(abs(mu[1] / mu[0] - 1.0), abs(mu[2] / mu[0] - 1.0)) > 1e-3
+
+
 def test_friction_recovers_after_a_larger_strain():
     """Left at twice the strain, three quarters of the share are lost at first, 1/e of that a time constant later."""
     broken = added("filler_recovery", share=0.4, tau=0.1)

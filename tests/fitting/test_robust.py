@@ -11,6 +11,8 @@ from fits import joint_fit
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import FitSettings
 from bushfit.campaign.simulated import SimulatedSweep
+from bushfit.commands.fit import campaign_files
+from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.geometry import Direction
 from bushfit.model.file import from_document, to_document
 from bushfit.model.model import FIVE
@@ -117,6 +119,9 @@ def test_outliers_are_listed_by_file_and_row_and_told(rig):
     assert any("--loss soft_l1" in line and "rows 5, 71" in line for line in linear.warnings)
     assert any("left out of the fit" in line and "row 124" in line for line in soft.warnings)
     assert from_document(to_document(soft)).outliers == soft.outliers
+    files = campaign_files(PreparedCampaign.from_campaign(dirty), soft)
+    (table,) = (file.content() for file in files if (file.name, file.kind) == ("sweeps", "table"))
+    assert table.groupby("sweep")["outlier"].apply(lambda column: (column == "yes").sum())["sweep_axial"] == 2
 
 
 @pytest.mark.parametrize(("factor", "missed"), [(0.7, 0), (1.1, 2)])

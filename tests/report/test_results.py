@@ -21,8 +21,9 @@ from bushfit.commands.compare import compare, compared_result
 from bushfit.commands.fit import fit
 from bushfit.commands.predict import predict
 from bushfit.errors import CONTROL, OutputError
+from bushfit.geometry import Specimen
 from bushfit.report.plots.style import to_image
-from bushfit.report.results import Formats, Picture, ResultFile, encode_all, write_results
+from bushfit.report.results import Formats, Picture, ResultFile, encode_all, place_names, write_results
 from bushfit.report.tables import loops_table, sweeps_table
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="processes are forked and killed")
@@ -143,6 +144,11 @@ def test_a_file_that_bushfit_did_not_write_is_never_replaced(tmp_path, force):
     names = {path.name for path in (tmp_path / "results").glob("[!.]*")}
     assert names == {"a.csv", "b.json", "c.csv", "d.csv", "e.csv"}
     assert (tmp_path / "results" / "b.json").read_bytes() == b"old b"
+
+
+def test_names_of_files_differ_by_more_than_capitals():
+    places = [Specimen(name, "modulus") for name in ("Mount", "mount", "coupon")]
+    assert place_names(places) == ["Mount", "mount_2", "coupon"]
 
 
 def drawn() -> Figure:

@@ -25,8 +25,12 @@ from bushfit.geometry import Direction
 from bushfit.inspection.opening import read_history
 from bushfit.inspection.record import Inspection
 from bushfit.model.result import Result
+from bushfit.reading.finding import find_table
+from bushfit.reading.headers import RESONANCE_COLUMNS
+from bushfit.reading.resonance import read_resonance
+from bushfit.reduction.resonance import reduce_resonance
 from bushfit.reduction.steps import reduce
-from bushfit.report.plots.inspection import inspection_figure, reduction_figure
+from bushfit.report.plots.inspection import inspection_figure, reduction_figure, resonance_figure
 
 LONG_NAME = "a file whose name tells all that is known of the test " * 3
 
@@ -34,6 +38,9 @@ LONG_NAME = "a file whose name tells all that is known of the test " * 3
 def test_differences_are_measured_minus_model_everywhere(paper_model, stiff, swept, looped):
     residuals = sweeps(stiff, swept(paper_model)).axes[2]
     assert all(np.mean(line.get_ydata()) < -5.0 for line in points(residuals))
+    line = lines(sweeps(stiff, swept(paper_model)).axes[0])[0]
+    wanted = 1e-3 * np.abs(stiff.stiffness("axial", line.get_xdata(), 1e-4))
+    np.testing.assert_allclose(line.get_ydata(), wanted, rtol=1e-6)
     phase = loops(stiff, looped(paper_model, 1e-3)).axes[1]
     (means,) = lines(phase)
     assert means.get_ydata()[0] < 0.0 < means.get_ydata()[len(means.get_ydata()) // 2], "at the upper turn, the lower"
@@ -93,6 +100,13 @@ def test_sweeps_of_many_amplitudes(paper_model, swept, count):
     assert len(points(left)) == count
     assert len(right.child_axes) == (count > 8)
     assert right.child_axes or len(legend(right)) == count
+
+
+def test_a_resonance_shows_the_amplitudes_reached_in_mm(root):
+    table = find_table(root / "data/measured/epdm_70/shaker_1g_573g.csv", RESONANCE_COLUMNS)
+    found = reduce_resonance(read_resonance(table, Direction.AXIAL), 0.5878)
+    (reached,) = points(whole(resonance_figure(found, "x")).axes[1])
+    np.testing.assert_allclose(reached.get_ydata(), 1e3 * found.amplitude)
 
 
 def test_a_reduction_shows_the_cycles_used_and_twice_the_standard_error(root):
