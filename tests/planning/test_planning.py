@@ -1,6 +1,7 @@
 """A plan against what is worked out another way: full covariances, every choice there is, and fits."""
 
 from dataclasses import fields, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -22,7 +23,7 @@ from bushfit.planning.candidates import candidates
 from bushfit.planning.compound import gent_modulus, guess_parameters
 from bushfit.planning.contract import Aim, Knowledge, Noise, PlanRequest, Test, operating_points
 from bushfit.planning.information import CandidateGrid, ModelInformation, relative_slopes, rival_chi_squares
-from bushfit.planning.plan import Plan, plan
+from bushfit.planning.plan import Plan, describe_purpose, plan
 from bushfit.planning.search import PlanSearch
 from bushfit.simulation.measured import measure
 from bushfit.simulation.undisturbed import undisturbed
@@ -172,6 +173,17 @@ def test_a_plan_is_better_than_the_standard_programme_and_errors_before_are_thos
         (goal,) = PlanSearch.from_request(known, request).goals
         relative = 1.96 * expected[1] / predicted(place, "mu", 1.0)[1]
         assert goal.half_width(covariance) == pytest.approx(relative.max(), rel=2e-3)
+
+
+def test_the_purpose_of_a_test_is_the_error_without_it():
+    search = SimpleNamespace(
+        counts=np.array([1, 2]),
+        request=SimpleNamespace(aim="parameters", parameters=("mu",)),
+        goals=(),
+        knowledge=SimpleNamespace(names=("mu",)),
+        error_covariance=lambda counts: np.array([[1.0 if counts.all() else 2.25]]),
+    )
+    assert describe_purpose(search, 1) == "mu: error 50 % larger without this run"
 
 
 @pytest.mark.parametrize(
