@@ -139,7 +139,7 @@ class LinearModel:
         misfit = gram[:, 0, 0] - np.sum(np.square(free[..., 0]), axis=1)
         parameters = np.linalg.solve(root.swapaxes(1, 2), free) / scale[:, None]
         deviation = shrinkage * (modes[..., 0] - (modes[..., 1:] @ parameters)[..., 0])
-        log_det = rig.roots[1][combinations] + np.sum(np.log(grown), axis=1)
+        log_det = rig.kernels[1][combinations] + np.sum(np.log(grown), axis=1)
         log_det += 2.0 * np.sum(np.log(np.einsum("ckk->ck", root) * scale), axis=1)
         log_det -= np.sum(np.log(self.precision[self.precision > 0.0]))
         base = rig.log_weight[cases] - 0.5 * (misfit + log_det)

@@ -34,8 +34,8 @@ class RigRows:
     @cached_property
     def shared(self) -> Array:
         """Inner products of the rows with the w errors of each block of the rig, (scatters, blocks, w, m)."""
-        weights, roots = self.rig.weights[0], self.rig.roots[0]
-        shared = np.zeros((len(weights), *roots.shape[1:3], len(self.rows)))
+        weights, kernels = self.rig.weights[0], self.rig.kernels[0]
+        shared = np.zeros((len(weights), len(kernels), kernels.shape[-1], len(self.rows)))
         for number, block in enumerate(self.rig.blocks):
             weighted = block.columns * weights[:, None, block.rows]
             shared[:, number, : len(block.kinds)] = weighted @ self.rows[:, block.rows].T
@@ -57,7 +57,7 @@ class RigRows:
         size, products = len(self.rows), np.empty((len(combinations), len(self.rows), len(other.rows)))
         for number in np.unique(scatter[combinations]):
             chosen = scatter[combinations] == number
-            kernels = self.rig.kernels[:, combinations[chosen]]
+            kernels = self.rig.kernels[0][:, combinations[chosen]]
             blocks, count, width, _ = kernels.shape
             errors = kernels.reshape(blocks, count * width, width) @ self.shared[number]
             errors = errors.reshape(blocks, count, width, size).transpose(1, 3, 0, 2)
@@ -186,9 +186,10 @@ class GroupSet:
         for n in combinations.tolist():
             if n not in self._within:
                 scatter = self.rig.weights[1][n]
-                errors = (self.rig.roots[0][n] @ self.rows.shared[scatter]).reshape(-1, len(self.rows.rows)).T
+                shared, errors = self.rows.shared[scatter], self.rig.kernels[0][:, n] @ self.rows.shared[scatter]
+                shared, errors = (array.reshape(-1, len(self.rows.rows)).T for array in (shared, errors))
                 self._within[n] = [
-                    products[scatter] - errors[batch.columns] @ errors[batch.columns].swapaxes(-1, -2)
+                    products[scatter] - shared[batch.columns] @ errors[batch.columns].swapaxes(-1, -2)
                     for batch, products in zip(self.batches, self._products_within, strict=True)
                 ]
         return [np.stack(arrays) for arrays in zip(*(self._within[n] for n in combinations.tolist()), strict=True)]

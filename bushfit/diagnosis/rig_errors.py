@@ -119,36 +119,31 @@ class RigErrors:
         return 1.0 / (variances + self.variance), index
 
     @cached_property
-    def roots(self) -> tuple[Array, Array]:
-        """Factors of the covariance N + W^T D^2 W of scatter N and rig errors W of sizes D, for every combination.
+    def kernels(self) -> tuple[Array, Array]:
+        """Inverse covariance of the residuals for every combination of sizes, in parts.
 
         Returns:
-            L^-1 D of 1 + D W N^-1 W^T D = L L^T, (combinations, blocks, w, w); and the natural log of the determinant
-            of the covariance, (combinations,).
+            K = D (1 + D W N^-1 W^T D)^-1 D with scatter N and rig errors W of sizes D, (blocks, combinations, w, w);
+            and the natural log of the determinant of the covariance, (combinations,).
 
         Notes:
-            Whitened inner products of rows R are R N^-1 R^T - (L^-1 D W N^-1 R^T)^T (L^-1 D W N^-1 R^T).
+            The covariance is N + W^T D^2 W, so whitened inner products of rows R are R N^-1 R^T less
+            (W N^-1 R^T)^T K (W N^-1 R^T).
         """
         sizes, _ = self.combinations
         weights, scatter = self.weights
         width = max((len(block.kinds) for block in self.blocks), default=0)
-        inner = np.zeros((len(weights), len(self.blocks), width, width))
-        kinds = np.full(inner.shape[1:3], -1)
+        inner = np.zeros((len(self.blocks), len(weights), width, width))
+        kinds = np.full((len(self.blocks), 1, width), -1)
         for number, block in enumerate(self.blocks):
             count = len(block.kinds)
-            inner[:, number, :count, :count] = block.columns * weights[:, None, block.rows] @ block.columns.T
-            kinds[number, :count] = block.kinds
-        errors = np.pad(sizes[:, 1:], ((0, 0), (0, 1)))[:, kinds]
-        root = np.linalg.cholesky(np.eye(width) + errors[..., None] * inner[scatter] * errors[..., None, :])
-        log_det = 2.0 * np.sum(np.log(np.einsum("nbii->nbi", root)), axis=(1, 2))
-        log_det -= np.sum(np.log(weights), axis=1)[scatter]
-        return np.linalg.inv(root) * errors[..., None, :], log_det
-
-    @cached_property
-    def kernels(self) -> Array:
-        """Products (L^-1 D)^T L^-1 D of the factors in `roots`, (blocks, combinations, w, w)."""
-        roots = self.roots[0].swapaxes(0, 1)
-        return np.asarray(roots.swapaxes(-1, -2) @ roots)
+            inner[number, :, :count, :count] = block.columns * weights[:, None, block.rows] @ block.columns.T
+            kinds[number, 0, :count] = block.kinds
+        errors = np.pad(sizes[:, 1:], ((0, 0), (0, 1)))[np.arange(len(sizes))[:, None], kinds]
+        pairs = errors[..., :, None] * errors[..., None, :]
+        covariance = np.eye(width) + pairs * inner[:, scatter]
+        log_det = np.linalg.slogdet(covariance)[1].sum(axis=0) - np.sum(np.log(weights), axis=1)[scatter]
+        return pairs * np.linalg.inv(covariance), log_det
 
 
 def in_scatter_units(fit: FitResult) -> FitResult:
