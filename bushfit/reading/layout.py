@@ -11,7 +11,7 @@ import csv
 import re
 from collections import deque
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from typing import Annotated, Literal, NamedTuple
 
@@ -20,7 +20,7 @@ from pydantic import BeforeValidator
 from bushfit import units
 from bushfit.reading.headers import WORDS, Vocabulary, plain, split_convention, split_unit
 from bushfit.reading.numerals import is_like_number
-from bushfit.reading.roles import CONDITIONS, PAIRS
+from bushfit.reading.roles import stated_once
 
 #: First words of rows that summarise others.
 _SUMMARIES = frozenset(map(plain, WORDS["rows_of"]["summary"]))
@@ -44,8 +44,6 @@ _LONGEST_HEADER = 10_000
 #: Non-empty lines below a header that are searched for its units row and first numbers; chosen: room for comments.
 _LINES_BELOW_HEADER = 8
 _DIGIT = re.compile(r"\d")
-#: Roles of columns that every operating point fills, and of columns that may be filled once for several.
-_OF_POINTS, _LEVELS = {role for pair in PAIRS for role in pair}, ("frequency", "amplitude", *CONDITIONS)
 _COMMENT_SIGNS = ("#", "%", "//")
 #: A number with a number sign: "#1".
 _NUMBERED = re.compile(r"#\s?\d+\b")
@@ -371,25 +369,11 @@ def _layout(
     numbered = bool(contents) and all(
         _NUMBERED.match(next(filter(None, split(content, delimiter)), "")) for content in contents
     )
-    levels = _stated_once(headers, [split(content, delimiter) for content in contents], vocabulary)
+    levels = stated_once(headers, [split(content, delimiter) for content in contents], vocabulary)
     names = ", ".join(f'"{headers[index]}"' for index in sorted(levels))
     notes = (f"{names}: an empty cell has the value of the cell above",) if levels else ()
-    return Layout(
-        delimiter, tuple(headers), number, tuple(row), units_line, numbered=numbered, notes=notes, levels=levels
-    )
-
-
-def _stated_once(headers: Sequence[str], rows: Sequence[Sequence[str]], vocabulary: Vocabulary) -> frozenset[int]:
-    """Indices of columns of a sweep that are filled only in the first of several rows, as an amplitude may be.
-
-    Rows count only if they have a stiffness or its loss; rows of waveforms do not.
-    """
-    roles = [heading.role if header and (heading := vocabulary.heading(header)) else "" for header in headers]
-    points = [row for row in rows if any(cell and role in _OF_POINTS for cell, role in zip(row, roles, strict=False))]
-    counts = {
-        n: sum(len(row) > n and row[n] != "" for row in points) for n, role in enumerate(roles) if role in _LEVELS
-    }
-    return frozenset(index for index, count in counts.items() if points and 2 * count <= len(points))
+    layout = Layout(delimiter, tuple(headers), number, tuple(row), units_line, notes=notes, levels=levels)
+    return replace(layout, numbered=numbered)
 
 
 def _below_headers(header: str, row: str) -> list[str]:

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 
 from bushfit.geometry import STRAINING, Motion
-from bushfit.reading.headers import STRAINING_COLUMNS, SWEEP_COLUMNS, WORDS
+from bushfit.reading.headers import STRAINING_COLUMNS, SWEEP_COLUMNS, WORDS, Vocabulary
 
 #: Names of columns in a test of strain and modulus, by role; they replace those of loops and sweeps.
 _STRAINING = STRAINING_COLUMNS | {"amplitude": SWEEP_COLUMNS["amplitude"] + STRAINING_COLUMNS["amplitude"]}
@@ -15,6 +15,8 @@ AGREEING_PAIRS = [(size, loss) for size, loss in map(str.split, WORDS["sets"]["a
 PAIRS = AGREEING_PAIRS + [(size, loss) for size, loss in map(str.split, WORDS["sets"]["stiffness"])]
 #: Roles of conditions, whose levels belong to different tests.
 CONDITIONS = ("temperature", "preload")
+#: Roles of columns that every operating point fills, and of columns that may be filled once for several.
+_OF_POINTS, _LEVELS = {role for pair in PAIRS for role in pair}, ("frequency", "amplitude", *CONDITIONS)
 #: SI unit, or the attribute of a motion that is the SI unit, by role; all other roles are ratios.
 _UNITS = {role: unit for unit, roles in WORDS["si_units"].items() for role in roles}
 
@@ -42,3 +44,17 @@ def si_unit(role: str, motion: Motion) -> str:
         return "Pa" if motion is STRAINING else "J"
     unit = _UNITS.get(role, "1")
     return str(getattr(motion, unit, unit))
+
+
+def stated_once(headers: Sequence[str], rows: Sequence[Sequence[str]], vocabulary: Vocabulary) -> frozenset[int]:
+    """Indices of columns of a sweep that are filled only in the first of several rows, as an amplitude may be.
+
+    Args:
+        headers: header cells of the table.
+        rows: cells of its first rows, as texts; only those with a stiffness or its loss count, not those of waveforms.
+        vocabulary: known column names.
+    """
+    roles = [heading.role if header and (heading := vocabulary.heading(header)) else "" for header in headers]
+    points = [row for row in rows if any(cell and role in _OF_POINTS for cell, role in zip(row, roles, strict=False))]
+    columns = [index for index, role in enumerate(roles) if points and role in _LEVELS]
+    return frozenset(n for n in columns if 2 * sum(len(row) > n and row[n] != "" for row in points) <= len(points))
