@@ -14,6 +14,8 @@ from bushfit.units import CELSIUS
 
 #: A key of more than 16 parts, such as a.b.c; parsing one takes time in proportion to the square of their number.
 _DEEP_KEY = re.compile(rb"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){16}""")
+#: A key that is written without quotes.
+_BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 
 #: Hint for an error of the TOML parser, by the first words of its message.
 _WAYS = {
@@ -138,7 +140,8 @@ def place_lines(place: Place) -> list[str]:
 def toml_value(value: Any) -> str:
     """Format a text, a number or a table as a TOML value."""
     if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{key} = {toml_value(entry)}" for key, entry in value.items()) + " }"
+        keys = {key: key if _BARE_KEY.fullmatch(key) else toml_value(key) for key in value}
+        return "{ " + ", ".join(f"{keys[key]} = {toml_value(entry)}" for key, entry in value.items()) + " }"
     if isinstance(value, str):
         escaped = value.replace("\\", "\\\\").replace('"', '\\"')
         return '"' + CONTROL.sub(lambda character: f"\\u{ord(character[0]):04x}", escaped) + '"'

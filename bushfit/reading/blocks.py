@@ -3,13 +3,13 @@
 import re
 from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from dataclasses import replace
-from itertools import groupby, islice, pairwise, zip_longest
+from itertools import accumulate, groupby, islice, pairwise, zip_longest
 from typing import NamedTuple
 
 from bushfit import units
 from bushfit.reading.headers import COUNTED, SWEEP_COLUMNS, Vocabulary, split_unit
 from bushfit.reading.layout import WITH_UNIT, Layout, Line, is_comment, is_row, is_summary_row, is_units_row
-from bushfit.reading.names import NO_LABELS, Labels, labels_above, labels_in_names, named_direction
+from bushfit.reading.names import NO_LABELS, Labels, labels_above, labels_in_names, labels_in_text, named_direction
 from bushfit.reading.numerals import is_like_number, plainest_value
 from bushfit.reading.roles import CONDITIONS
 from bushfit.reading.source import Channels, RowSource, Sheet, Text, cells_of
@@ -94,8 +94,9 @@ def combined(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> tuple
     if len(blocks) < 2:
         return _with_plain_cells(source, layout)
     titles = [block.above[-1].text if block.above else "" for block in blocks]
-    labels = [labels_above(block.above) | labels_in_names(title) for block, title in zip(blocks, titles, strict=True)]
-    added = _label_columns(labels, titles, titles if sides else [], vocabulary.roles(layout.headers))
+    labels = [_block_labels(block, title) for block, title in zip(blocks, titles, strict=True)]
+    labels = list(accumulate(labels, _continued))
+    added = _label_columns(labels, titles if sides else [], vocabulary.roles(layout.headers))
     numbers, content, width = list[int](), list[Sequence[str | float]](), len(layout.headers)
     for index, row in ((index, row) for index, block in enumerate(blocks) for row in block.rows):
         cells, texts = cells_of(row, layout.delimiter), [column[index] for column in added.values()]
@@ -104,7 +105,8 @@ def combined(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> tuple
         numbers.append(row.number)
     layout = replace(layout, headers=(*layout.headers, *added), units=(*layout.units, *[""] * len(added)))
     head = [line for line in source.head() if line.number < layout.header_line]
-    above = [line for line in head if not labels_above([line]).quantities]  # those of a block are in its rows
+    in_rows = {header.partition(" ")[0] for header in added}.intersection(CONDITIONS)
+    above = [line for line in head if not _is_of_block(line, in_rows)]
     return _with_plain_cells(Sheet(source.sheet or "", content, above=above, numbers=numbers), layout)
 
 
@@ -220,14 +222,29 @@ def _stacked_blocks(source: RowSource, layout: Layout, vocabulary: Vocabulary) -
     return blocks
 
 
-def _label_columns(
-    labels: Sequence[Labels], titles: Sequence[str], parts: Sequence[str], roles: set[str]
-) -> dict[str, list[str | float]]:
+def _block_labels(block: Segment, title: str) -> Labels:
+    """Labels of a block in the lines above it, the last of which is its title."""
+    labels = labels_above(block.above) | labels_in_names(title) | labels_in_text(block.above)
+    return replace(labels, direction=labels.direction or named_direction(line.text for line in block.above))
+
+
+def _continued(before: Labels, labels: Labels) -> Labels:
+    """Labels of a block after another: a stated condition applies until another one is stated."""
+    conditions = {key: getattr(labels, key) or getattr(before, key) for key in ("direction", *CONDITIONS)}
+    return replace(labels, **conditions)
+
+
+def _is_of_block(line: Line, conditions: set[str]) -> bool:
+    """True if a line above the first block states a quantity, or one of the conditions, of this block alone."""
+    labels = labels_above([line]) | labels_in_text([line])
+    return bool(labels.quantities) or any(getattr(labels, key) for key in conditions)
+
+
+def _label_columns(labels: Sequence[Labels], parts: Sequence[str], roles: set[str]) -> dict[str, list[str | float]]:
     """Columns to add to a table, so that its rows show the block from which they come.
 
     Args:
         labels: labels of each block.
-        titles: title of each block, which may name a direction.
         parts: name of the part in each block, used if no quantity distinguishes the blocks.
         roles: roles for which the blocks already have a column.
 
@@ -245,9 +262,8 @@ def _label_columns(
         texts = [(getattr(label, role) or "").strip().partition(" ") for label in labels]
         if role not in roles and all(map(any, texts)) and len({unit for *_, unit in texts}) == 1:
             columns[f"{role} [{texts[0][2]}]"] = [float(number) for number, *_ in texts]
-    directions = [named_direction([title], short=True) for title in titles]
-    if all(directions):
-        columns["direction"] = [str(direction) for direction in directions]
+    if all(label.direction for label in labels):
+        columns["direction"] = [str(label.direction) for label in labels]
     are_runs = all(_RUNS.heading(title.rstrip(" #.0123456789")) for title in parts)
     numbers = [label.specimen_number or "" for label in labels]
     named = numbers if all(numbers) else [] if columns else parts
