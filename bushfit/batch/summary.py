@@ -22,6 +22,7 @@ from bushfit.batch.store import ROWS_FOLDER
 from bushfit.effects import is_parameter
 from bushfit.effects.contract import Array
 from bushfit.effects.unnamed import NAME as UNNAMED
+from bushfit.fitting.procedures import NEXT
 from bushfit.model.covariance import Z95
 from bushfit.prediction.caveats import BEYOND
 from bushfit.reduction.arrays import median_and_scatter
@@ -297,6 +298,10 @@ class BatchResult:
         if poor := [part.name for part in parts if part.poor_fit]:
             judged = "; their limits are judged on measured points, if such points exist" if self.plan.limits else ""
             warnings.append(f"the model misses the tests of {listed(poor)}: do not use their parameters{judged}")
+        missing = [part.name for part in parts if not part.poor_fit and any(NEXT in line for line in part.warnings)]
+        if missing:
+            names = listed(missing)
+            warnings.append(f"the model misses more than the noise of {names}: --command diagnose looks for the cause")
         if lacking := [part.name for part, lacks in zip(parts, self.lacks_sweep, strict=True) if lacks]:
             warnings.append(f"no sweep, unlike the other parts, and so not compared with them: {listed(lacking)}")
         warnings += [*self.allowed[1], *self.notes]

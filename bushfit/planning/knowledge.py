@@ -90,7 +90,7 @@ def from_campaign(data: PreparedCampaign, rivals: Sequence[str] | None = None) -
             "there are no rivals that a loop or sweep distinguishes",
             file=data.campaign.path,
             found=f"verdict {diagnosis.verdict}; next test: {diagnosis.next_test or 'none'}",
-            expected="an ambiguous verdict, with effects that a further loop or sweep distinguishes",
+            expected="several possible effects that a further loop or sweep of the bushing distinguishes",
             hint="make the next test, name effects with --rivals, or plan for parameters or predictions",
         )
     certain = [name for name in diagnosis.result.model.effects if name not in model.effects]
