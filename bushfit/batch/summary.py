@@ -300,8 +300,8 @@ class BatchResult:
             warnings.append(f"the model misses the tests of {listed(poor)}: do not use their parameters{judged}")
         missing = [part.name for part in parts if not part.poor_fit and any(NEXT in line for line in part.warnings)]
         if missing:
-            names = listed(missing)
-            warnings.append(f"the model misses more than the noise of {names}: --command diagnose looks for the cause")
+            misfit = f"the model misses the tests of {listed(missing)} by more than their noise"
+            warnings.append(f"{misfit}: --command diagnose looks for the cause")
         if lacking := [part.name for part, lacks in zip(parts, self.lacks_sweep, strict=True) if lacks]:
             warnings.append(f"no sweep, unlike the other parts, and so not compared with them: {listed(lacking)}")
         warnings += [*self.allowed[1], *self.notes]

@@ -120,11 +120,16 @@ class Reduction:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Warnings on outliers, mean values, missed levels, sampling, distortion, and stretches without a point."""
+        """Warnings on outliers, negative losses, mean values, missed levels, sampling, distortion, and stretches without a point."""
         steps, sentences = self.steps, list[str]()
         unit, factor = self.direction.display.displacement
         if self.outliers:
             sentences.append(f"{self.outliers} row{'s' * (self.outliers > 1)} far from their neighbours left out")
+        if negative := [step for step in steps if step.stiffness.imag < 0.0]:
+            sentences.append(
+                f"{len(negative)} of {len(steps)} points have a loss factor below zero, the first at "
+                f"{negative[0].frequency:.4g} Hz: is the force or the displacement recorded late?"
+            )
         sentences += preload_warnings(steps, self.direction)
         # the steepest d ln|K| / d ln X between neighbouring levels at one frequency
         ordered = sorted(steps, key=lambda step: (step.nominal_frequency, step.amplitude))

@@ -184,6 +184,12 @@ def test_repeats_and_levels(paper_model):
         reduce([first], levels=(2e-4,))
 
 
+def test_a_late_force_is_reported(paper_model):
+    record = stepped(paper_model, [(10.0, 1e-4), (30.0, 1e-4)])
+    late = replace(record, force=np.interp(record.time - 2e-3, record.time, record.force))
+    assert any("2 of 2 points have a loss factor below zero" in line for line in reduce([late]).warnings)
+
+
 @pytest.mark.parametrize(
     ("motion", "said"),
     [
