@@ -120,7 +120,7 @@ class Reduction:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Warnings on outliers, negative losses, mean values, levels, sampling, distortion, and stretches without a point."""
+        """Warnings on outliers, negative losses, means, levels, sampling, distortion, and parts without a point."""
         steps, sentences = self.steps, list[str]()
         unit, factor = self.direction.display.displacement
         if self.outliers:
