@@ -1,4 +1,4 @@
-"""Texts and probabilities of the explanations of a gap, and the table of all candidates."""
+"""Texts, probabilities and amounts of the explanations of a gap, and the table of all candidates."""
 
 from collections import defaultdict
 from collections.abc import Sequence
@@ -10,10 +10,13 @@ from bushfit.diagnosis.hypotheses import Hypothesis
 from bushfit.diagnosis.record import CandidateResult, Odds, format_probability
 from bushfit.diagnosis.search import Search
 from bushfit.diagnosis.verdict import Composition, Finding
-from bushfit.effects import get_effect
+from bushfit.effects import get_effect, qualified_name
+from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.fitting.problem import FitResult
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
+from bushfit.model.result import Result
+from bushfit.units import display_unit, format_aligned
 
 #: Reason for a candidate that is not part of the explanation.
 _LESS_LIKELY = "another explanation is more probable"
@@ -128,3 +131,16 @@ def list_candidates(
         gain = base.chi_square - after.chi_square
         candidates.append(CandidateResult(name, proposal.score, gain, probability[name], values, why))
     return sorted(candidates, key=lambda candidate: -candidate.score)
+
+
+def format_amount(name: str, result: Result) -> str:
+    """Text on the amount of an effect in a model, with unit and 95 % interval; "" if the model has no such amount."""
+    if name == UNNAMED or name not in result.model.effects or (effect := get_effect(name)).replaces is not None:
+        return ""
+    amount, parameter = effect.amount, qualified_name(effect, effect.amount)
+    value, interval = result.model.values[parameter], result.interval(parameter)
+    unit, factor = display_unit(amount.unit, 1.0, value)
+    value_text, *ends = format_aligned([factor * x for x in (value, *(interval or ()))], 3)
+    quantity, _, _ = (amount.meaning or amount.name).partition(" (")
+    text = f"{quantity}: {f'{value_text} {unit}'.removesuffix(' -').removesuffix(' 1')}"
+    return f"{text} (95 % interval {ends[0]} to {ends[1]})" if ends else text

@@ -16,6 +16,7 @@ from bushfit.diagnosis.document import Verdict
 from bushfit.diagnosis.explanation_text import (
     causes_text,
     explanation_odds,
+    format_amount,
     list_candidates,
     probability_text,
     undecided_text,
@@ -38,7 +39,7 @@ from bushfit.fitting.problem import FitResult
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
 from bushfit.model.result import Result
-from bushfit.units import display_unit, format_aligned, number
+from bushfit.units import number
 
 #: Summary if there is no gap; and note on tests of one direction.
 _NOTHING = "the tests show no missing effect beyond noise and tolerance"
@@ -361,7 +362,7 @@ class DiagnosisWriter:
         )
         odds = explanation_odds(self.finding)
         result = with_rig_alternatives(odds.averaged(fitted), self.hypotheses, base)
-        amounts = filter(None, (_format_amount(entry.name, result) for entry in entries))
+        amounts = filter(None, (format_amount(entry.name, result) for entry in entries))
         rest = [f"the rest: {' and '.join(remainder)}"] if remainder else []
         return Diagnosis(
             verdict or self.finding.verdict,
@@ -397,16 +398,3 @@ def _may_be_absent(name: str, result: Result) -> bool:
         return False
     low, high = result.interval(amount) or (result.model.values[amount],) * 2
     return low <= neutral <= high
-
-
-def _format_amount(name: str, result: Result) -> str:
-    """Text on the amount of an effect in a model, with unit and 95 % interval; "" if the model has no such amount."""
-    if name == UNNAMED or name not in result.model.effects or (effect := get_effect(name)).replaces is not None:
-        return ""
-    amount, parameter = effect.amount, qualified_name(effect, effect.amount)
-    value, interval = result.model.values[parameter], result.interval(parameter)
-    unit, factor = display_unit(amount.unit, 1.0, value)
-    value_text, *ends = format_aligned([factor * x for x in (value, *(interval or ()))], 3)
-    quantity, _, _ = (amount.meaning or amount.name).partition(" (")
-    text = f"{quantity}: {f'{value_text} {unit}'.removesuffix(' -').removesuffix(' 1')}"
-    return f"{text} (95 % interval {ends[0]} to {ends[1]})" if ends else text
