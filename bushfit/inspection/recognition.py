@@ -15,7 +15,7 @@ from bushfit.reading.finding import find_table
 from bushfit.reading.headers import LOOP_COLUMNS, RESONANCE_COLUMNS, SWEEP_COLUMNS, Vocabulary
 from bushfit.reading.labelled import Rows
 from bushfit.reading.layout import FileFormat
-from bushfit.reading.names import direction_of_file
+from bushfit.reading.names import direction_of_file, named_direction
 from bushfit.reading.parts import OpenedFile, open_file
 from bushfit.reading.resonance import is_resonance
 from bushfit.reading.roles import PAIRS, of_motion
@@ -159,9 +159,14 @@ def test_direction(file: Path, table: Table, test_options: Mapping[str, Any]) ->
     is_torsion = any(table.agrees(role, "rad") for role in ("displacement", "amplitude"))
     headers = table.layout.written or table.headers
     in_column = dict.fromkeys(table.row_labels.get("direction", (0, ()))[1])
-    named = direction_of_file(file, headers, turns=is_torsion, sheet=table.source.sheet)
-    found = Direction(*in_column) if len(in_column) == 1 else named
-    if (option := test_options.get("direction")) is None:
+    by_name = direction_of_file(file, (), turns=is_torsion, sheet=table.source.sheet)
+    # test machines call the channels of their actuator axial, whatever the direction of the bushing
+    of_channels = direction_of_file(file, headers, turns=is_torsion)
+    stated = Direction(*in_column) if len(in_column) == 1 else by_name or table.labels_above.direction
+    option, in_text = test_options.get("direction"), named_direction(line.text for line in table.lines_above)
+    is_doubtful = of_channels is Direction.AXIAL and (option or in_text not in (None, of_channels))
+    found = stated or (None if is_doubtful else of_channels)
+    if option is None:
         if len(in_column) > 1:
             problem, hint = "this file contains tests in several directions", "state one: --direction axial"
             raise table.header_error(problem, found=", ".join(in_column), expected="one direction", hint=hint)
@@ -171,8 +176,7 @@ def test_direction(file: Path, table: Table, test_options: Mapping[str, Any]) ->
             f"{'the units say' if is_torsion else 'the file says'} {found}, but --direction says {option}",
             found=", ".join([*filter(None, [file.name, table.source.sheet]), *headers]),
             expected="one direction",
-            hint="leave --direction out; or state the direction in the file name, which takes precedence over "
-            "the header",
+            hint="leave --direction out, or correct what the file states",
         )
     return Direction(option)
 

@@ -54,7 +54,11 @@ _SPECIMEN_NUMBER = re.compile(
 #: Range of test temperatures [degC]; chosen: a number with a C outside this range is part of a part number.
 _TEMPERATURES = (-100.0, 300.0)
 #: Key of a campaign by each of its usual names above a table.
-_KEY_OF = {plain(name): key for key, names in WORDS["above"].items() for name in names}
+_KEY_OF = {
+    plain(name): key
+    for key, names in {**WORDS["above"], "direction": WORDS["rows"]["direction"]}.items()
+    for name in names
+}
 #: SI unit of the two keys for the time between rows.
 _SAMPLING = {"sampling_rate": "Hz", "sampling_interval": "s"}
 #: Usual names of amplitude and frequency above a table.
@@ -240,6 +244,8 @@ def _label_in_line(line: Line) -> Labels:
         is_value = len(cells[1]) <= _LONGEST_VALUE and plain(cells[1]) not in _KEY_OF  # else a row of headers
         values = {key: cells[1]} if is_value else {}
         return Labels(**values)
+    if key == "direction":
+        return Labels(direction=named_direction([cells[1]], short=True))
     if key in _SAMPLING:
         usual = "Hz" if key == "sampling_rate" else "s" if plain(name) == "wfincrement" else ""
         for form in (forms[1], f"{cells[1]} {unit or usual}"):

@@ -137,6 +137,25 @@ def test_a_line_above_blocks_applies_until_another_of_its_kind(typed, points, tm
         assert sorted(np.abs(sweep.stiffness)) == pytest.approx(sorted(first * factor))
 
 
+@pytest.mark.parametrize(
+    ("above", "option", "expected"),
+    [
+        ("Machine: 5", (), "axial"),
+        ("Direction: radial", (), "radial"),
+        ("Test: radial stiffness", (), None),
+        ("Test: radial stiffness", ("--direction", "radial"), "radial"),
+    ],
+)
+def test_channels_named_axial_are_those_of_the_machine(typed, tmp_path, above, option, expected):
+    time = np.linspace(0.0, 6.0, 600, endpoint=False)
+    rows = [f"{t:.3f},{np.sin(np.pi * t):.5f},{500.0 * np.sin(np.pi * t + 0.1):.3f}" for t in time]
+    lines = [above, "Time (s),Axial Displacement (mm),Axial Force (N)", *rows]
+    (tmp_path / "loop.csv").write_text("\n".join(lines), encoding="utf-8")
+    document = json.loads(typed("inspect", "loop.csv", *option, "--json", "--no-plots").stdout)
+    assert (f'direction = "{expected}"' in document["campaign"]) == (expected is not None)
+    assert ('direction = "..."' in document["campaign"]) == (expected is None)
+
+
 def test_loops_of_one_file_at_two_preloads_are_a_campaign(typed, tmp_path):
     time = np.linspace(0.0, 6.0, 600, endpoint=False)
     lines = []
