@@ -24,7 +24,7 @@ PEAK_TO_PEAK = [
     "Schwingweite [mm]", "2A [mm]", "total amplitude [mm]", "displacement range [mm]", "amplitude totale [mm]",
     "Amplitude c-à-c [mm]", "Amplitud pico-pico (mm)", "両振幅 [mm]", "振幅峰峰值 (mm)",
     "Peak-to-valley amplitude [mm]", "AmpPkPk(mm)", "DA [mm]", "Amplitude (2a) [mm]", "Amplitude max-min [mm]",
-    "Double amplitude (mm)", "DispPkPk [mm]", "Ampl. DA (mm)", "Xpp [mm]",
+    "Double amplitude (mm)", "DispPkPk [mm]", "Ampl. DA (mm)", "Xpp [mm]", "Weg Spitze-Tal [mm]",
 ]  # fmt: skip
 ZERO_TO_PEAK = [
     "Amplitude 0-p [mm]", "Weg 0-s [mm]", "Amplitude 0-S [mm]", "Amplitude (0-P) [mm]", "Amplitude (0-pk) [mm]",
