@@ -21,7 +21,7 @@ from bushfit.inspection.labels import count_temperatures
 from bushfit.inspection.opening import inspect_file
 from bushfit.inspection.recognition import open_table, recognize_table
 from bushfit.inspection.record import Inspection
-from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS
+from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS, split_unit
 from bushfit.reading.instruments import word_for_part
 from bushfit.reading.labelled import same_text
 from bushfit.reading.layout import FileFormat
@@ -194,7 +194,11 @@ def split_rows(source: TestSource) -> tuple[list[TestSource], list[str]]:
         return [source], []
     for texts, tests_at_levels in levels.items():
         keys: dict[str, Any] = dict(zip(columns, texts, strict=True))
-        run = {"rows": {table.headers[columns["run"][0]]: keys.pop("run")}} if "run" in keys else {}
+        run: dict[str, Any] = {}
+        if text := keys.pop("run", None):
+            header = table.headers[columns["run"][0]]
+            name, unit, _ = split_unit(header)
+            run = {"rows": {header: text}} | ({name: f"{text} {unit}"} if name in CONDITIONS and unit else {})
         is_direction = keys.get("direction", "axial") in [*Direction]
         if is_direction and all(same_text(str(test_options.get(key, text)), text) for key, text in keys.items()):
             tests += [replace(source, test_options={**test_options, **keys, **run, **test}) for test in tests_at_levels]
