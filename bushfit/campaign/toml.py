@@ -138,7 +138,11 @@ def place_lines(place: Place) -> list[str]:
 
 
 def toml_value(value: Any) -> str:
-    """Format a text, a number or a table as a TOML value."""
+    """Format a text, a number or a table as a TOML value.
+
+    Returns:
+        Text of the value, such as '"23 degC"' or '{ block = "1" }'.
+    """
     if isinstance(value, Mapping):
         keys = {key: key if _BARE_KEY.fullmatch(key) else toml_value(key) for key in value}
         return "{ " + ", ".join(f"{keys[key]} = {toml_value(entry)}" for key, entry in value.items()) + " }"

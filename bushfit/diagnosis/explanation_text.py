@@ -134,7 +134,15 @@ def list_candidates(
 
 
 def format_amount(name: str, result: Result) -> str:
-    """Text on the amount of an effect in a model, with unit and 95 % interval; "" if the model has no such amount."""
+    """Format the amount of an effect in a model.
+
+    Args:
+        name: name of the effect.
+        result: fitted result.
+
+    Returns:
+        Text such as "moving mass: 0.25 kg (95 % interval 0.24 to 0.26)"; "" if the model has no such amount.
+    """
     if name == UNNAMED or name not in result.model.effects or (effect := get_effect(name)).replaces is not None:
         return ""
     amount, parameter = effect.amount, qualified_name(effect, effect.amount)

@@ -122,6 +122,9 @@ class LinearModel:
 
         Args:
             cases: indices of c noise cases, (c,).
+
+        Returns:
+            For each case, the log evidence without a further explanation, and what is needed to add explanations.
         """
         rig, rows, deviates = self.rig, self.rows, bool(self.rig.deviation[cases].any())
         none = Group(np.zeros((0, self.residual.size)), np.zeros((0, 1)), act_together=True)
@@ -158,6 +161,9 @@ class LinearModel:
         Args:
             sets: the explanations.
             cases: indices of the noise cases to average over; None for all cases.
+
+        Returns:
+            Evidence of each group of the first set, then of the second, and so on.
         """
         projection = self.project(self.cases if cases is None else cases)
         plain, deviates = self.rig.is_plain[projection.cases], self.rig.deviation[projection.cases] > 0.0

@@ -52,7 +52,15 @@ class RecordedTests:
     def of_fit(
         cls, base: FitResult, rig: RigSettings, log_prior: float, claim: Claim | None = None, change: float = 0.0
     ) -> RecordedTests:
-        """Build the tests from a fit of the starting model; see the class for the arguments."""
+        """Build the tests from a fit of the starting model.
+
+        Args:
+            base: fit of the starting model to the tests, as recorded or with a mistake corrected.
+            rig: accuracy class of the rig.
+            log_prior: natural log of the prior probability that this record is right and nothing is missing.
+            claim: mistake that is corrected; None for the tests as recorded.
+            change: largest relative change of a recorded quantity in the correction; 0 for the tests as recorded.
+        """
         bare = in_scatter_units(base)
         return cls(base, bare, rig, rig_errors(bare, rig), compound(bare), log_prior, claim, change)
 
@@ -131,6 +139,9 @@ def record_change(base: FitResult, corrected: FitResult) -> float:
     Args:
         base: fit to the tests as recorded.
         corrected: fit to the corrected tests.
+
+    Returns:
+        Largest of |after/before - 1| over all values.
     """
     pairs = list(zip(base.data_sets, corrected.data_sets, strict=True))
     if base.model.bushing != corrected.model.bushing or any(

@@ -160,7 +160,13 @@ class MeasuredBase(ABC):
         return {}
 
     def recall(self, key: str, model: Model, names: Any = ()) -> Array | None:
-        """Return the array that `keep` cached for the same key, model and parameter names; None if there is none."""
+        """Return the array that `keep` cached for the same key, model and parameter names; None if there is none.
+
+        Args:
+            key: name of the cached quantity.
+            model: model that the values belong to.
+            names: names of the parameters of the derivatives.
+        """
         last = self._cache.get(key)
         return last[2] if last and last[0] is model and last[1] == names else None
 

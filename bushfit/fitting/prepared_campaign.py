@@ -201,7 +201,7 @@ class PreparedCampaign:
         before = [name for name in (*BASE, *effects) if name in replaced or (name in effects and name not in added)]
         plain = Model.with_defaults(bushing, [*dict.fromkeys(before)], starts[best], constraints=self.constraints)
         names = [*models[best].parameters, *plain.parameters]
-        still = [name for name in names if name in stage_fixed or not self.free((name,))]
+        still = [name for name in names if not self.free((name,))]
         return start_with_effects(models[best], plain, data_sets, still, self.bounds)
 
     def problem(self, model: Model, data_sets: Sequence[MeasuredTest], fixed: Collection[str] = ()) -> FitProblem:
