@@ -1,5 +1,6 @@
 """Roles of the columns of a table, from their names and units together."""
 
+import re
 from collections.abc import Mapping
 from dataclasses import replace
 from difflib import get_close_matches
@@ -35,6 +36,10 @@ from bushfit.reading.times import clock
 
 #: Smallest similarity, from 0 to 1, of a header that is suggested for a missing one; chosen: one word of two suffices.
 _ALIKE = 0.4
+#: Factor at the end of a name, outside of the unit: "K*/1000", "Amplitude x10".
+_FACTOR = re.compile(r"(?:/|\s[x×*])\s?(?!1$)\d+(?:[.,]\d+)?$")
+#: Number at the end of the name of one of several columns for a quantity: "K1", "Phase_2".
+_NUMBERED = re.compile(r"(.*?[^\d\s_])[\s_]?([12])")
 
 
 def classify(
@@ -83,8 +88,12 @@ def classify(
     for role in ("amplitude_reached", "acceleration"):
         if role in roles and "amplitude" not in roles:
             roles["amplitude"] = replace(roles.pop(role), role="amplitude")
+    named = {*roles}
     by_unit, unused = add_by_unit(table, roles)
     notes += by_unit
+    for role in roles.keys() & stated_units.keys() - named:
+        convention, index = roles[role].convention, roles[role].index
+        roles[role] = replace(column_of(table, Heading(role), index, stated_units[role]), convention=convention)
     if {"displacement", "force"} <= {*roles} and "displacement" not in columns:
         for column in (one for one in unused if moves_along(table, roles["displacement"], one)):
             _preferred_column(table, roles["displacement"], replace(column, role="displacement"))
@@ -96,11 +105,49 @@ def classify(
         notes += add_motion_as_amplitude(table, roles, stated_units)
     if "damping_coefficient" in roles and "stiffness" in roles and "stiffness" not in columns:
         notes += name_parallel_spring(roles)
+    stated = {*columns, *stated_units}
+    _require_plain_names(table, {role: column for role, column in roles.items() if role not in stated})
     time = roles.get("time")
     is_clock = time is not None and clock(str(table.first_row[time.index])) is not None
     notes = [*table.layout.notes, *notes]
     clocks = frozenset({time.index} if time and is_clock else ())
     return replace(table, roles=roles, notes=tuple(notes), clocks=clocks)
+
+
+def _require_plain_names(table: Table, roles: Mapping[str, Column]) -> None:
+    """Ask about columns whose names contain a factor, or a number that may be that of a repeat or a part.
+
+    Args:
+        table: header and rows of the table.
+        roles: columns by role, without those that the user states.
+
+    Raises:
+        MeasurementError: such a column.
+    """
+    names = {role: split_unit(column.header)[0].strip() for role, column in roles.items()}
+    for role, name in names.items():
+        if _FACTOR.search(name):
+            raise table.header_error(
+                f"the name of the {role.replace('_', ' ')} contains a factor",
+                found=f'"{roles[role].header}"',
+                expected="numbers in the stated unit",
+                hint=f'if they are, name the column: columns = {{ {role} = "{roles[role].header}" }} in the campaign; '
+                f'otherwise write the factor into the unit, such as units = {{ {role} = "10^3 {roles[role].unit}" }}',
+            )
+    stems = {"1": set[str](), "2": set[str]()}
+    for header in table.headers:
+        if match := _NUMBERED.fullmatch(split_unit(header)[0].strip()):
+            stems[match[2]].add(match[1].casefold())
+    both = {"storage_stiffness", "loss_stiffness"} <= names.keys()
+    if both and len(stems["1"] & stems["2"]) > 1 and _NUMBERED.fullmatch(names["storage_stiffness"]):
+        header = roles["storage_stiffness"].header
+        raise table.header_error(
+            "numbered columns may be repeats, parts, or storage and loss",
+            found=", ".join(table.headers),
+            expected="one stiffness and its loss, or the storage and loss stiffness",
+            hint=f'name the columns: columns = {{ stiffness = "{header}", phase = "..." }} in the campaign for each '
+            f'test, or columns = {{ storage_stiffness = "{header}", loss_stiffness = "..." }}',
+        )
 
 
 def _stated_indices(table: Table, vocabulary: Vocabulary, columns: Mapping[str, str]) -> dict[int, str]:

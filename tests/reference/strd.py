@@ -116,8 +116,14 @@ class CurveTerm:
         """No variance of the noise was estimated beforehand."""
         return {}
 
+    def response(self, curve: Curve) -> Array:
+        return self.problem.of(curve.values)
+
+    def residual_of(self, response: Array) -> Array:
+        return (response - self.problem.response) / self.noise
+
     def residual(self, curve: Curve) -> Array:
-        return (self.problem.of(curve.values) - self.problem.response) / self.noise
+        return self.residual_of(self.response(curve))
 
     def recall(self, _: str, curve: Curve, names: Sequence[str]) -> Array:
         """Residuals, then derivatives by complex steps, which lose no digits."""
