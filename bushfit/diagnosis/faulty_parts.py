@@ -123,13 +123,13 @@ class OutlierCluster(FaultyPart):
 
 
 def is_pattern(faulty_parts: Sequence[FaultyPart]) -> bool:
-    """True if suspected faults of the tests form a pattern, which may be an effect that the model lacks.
+    """True if suspected faults look like an effect that the model lacks rather than like faults of single tests.
 
-    Patterns are faults at several frequencies, as by a resonance, or at frequencies of all directions; at the smallest
-    or largest level, as by a contact; or of two loops of one direction, rate and amplitude, which repeat each other.
+    Such patterns are:
 
-    Returns:
-        True for a pattern.
+    - two or more frequencies of a sweep, as by a resonance, or the same frequency in every direction;
+    - the smallest or the largest level, as by a contact;
+    - two loops of the same direction, rate and amplitude.
     """
     if sum(part.family == "frequency" for part in faulty_parts) > 1 or any(
         part.may_be_physics for part in faulty_parts

@@ -38,7 +38,8 @@ class Hypothesis:
         state: step of the search (fitted model) that has exactly these explanations, or all but the last.
         log_posterior: natural log of prior times evidence, not normalised.
         change: largest relative change of |K| by any of the explanations.
-        last: last explanation, if its evidence is that of the linear model; None without one.
+        last: explanation that is not fitted in `state` and whose evidence is from the linearised model; None if all are
+            fitted.
         last_change: relative change of |K| due to the last explanation or the compound's deviation; 0 without either.
         compound_deviates: True if the compound deviates from the model's laws in addition.
         levels: True if errors of amplitude levels are larger than the accuracy class of the rig allows.

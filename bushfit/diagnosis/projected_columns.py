@@ -170,7 +170,11 @@ class GroupSet:
 
     @cached_property
     def _products_within(self) -> list[Array]:
-        """Inner products within the blocks of each batch without rig errors, (scatters, blocks, width, width)."""
+        """Gram matrices of the columns of each block, before rig errors are projected out, one array for each batch.
+
+        Each array is (scatters, blocks, width, width): for each assumed scatter of the points and each block of columns
+        that act together, the inner products of its `width` columns.
+        """
         by_batch = []
         for batch in self.batches:
             rows = self.rows.rows[batch.columns]

@@ -90,10 +90,13 @@ class RecordedTests:
 
 @dataclass(frozen=True, eq=False)
 class ExplanationColumns:
-    """Columns of explanations of a gap that do not depend on effects, and of what is part of every hypothesis.
+    """Changes of the residuals per unit of each explanation other than an effect, one column each.
+
+    Such explanations are faulty parts of the tests and smooth curves. The columns of the compound's deviation, which is
+    part of every hypothesis, are included.
 
     Args:
-        tests: tests with these explanations.
+        tests: tests whose gap is explained.
         errors: errors of the rig, perhaps with further scatter of some points.
     """
 

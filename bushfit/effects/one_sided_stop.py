@@ -10,7 +10,8 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
     """Complex stiffness with a stop on one side beyond a gap.
 
     Args:
-        p: parameter values by name: gap [m], free travel in the positive sense, and stiffness k [N/m] of the stop.
+        p: parameter values by name: gap [m], free travel in the positive sense, and stiffness k [N/m] of the stop. The
+            effect is not used in torsion.
         below: complex stiffness K without this effect, as a function of omega and amplitude.
         omega, amplitude: angular frequency [rad/s] and displacement amplitude X [m or rad], (..., n).
         setting: the test: bushing, direction and kind (sweep or loop).
@@ -32,7 +33,8 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
     """Force with a stop on one side beyond a gap.
 
     Args:
-        p: parameter values by name: gap [m], free travel in the positive sense, and stiffness k [N/m] of the stop.
+        p: parameter values by name: gap [m], free travel in the positive sense, and stiffness k [N/m] of the stop. The
+            effect is not used in torsion.
         below: force F without this effect, as a function of the displacement history.
         history: displacement over time [m or rad], (..., n).
         setting: the test: bushing, direction and kind (sweep or loop).

@@ -42,7 +42,7 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
 
         A slider of largest stress s that slips at the strain e_y, with r = e_y/e0 < 1 and cos t = 1 - 2r, has
         A = s (t - sin(2t)/2)/(pi r) and B = 4 s (1 - r)/pi; one that does not slip has A = s/r. The integrals of these,
-        divided by e_y, over ln e_y are (4 (t + sin t) - (t - sin(2t)/2)/r + 4i (ln r - r))/(pi e0) and -1/e_y.
+        divided by s e0, over ln e_y are (4 (t + sin t) - (t - sin(2t)/2)/r + 4i (ln r - r))/(pi e0) and -1/e_y.
 
     >>> modulus({"sigma": 2e4, "e_s": 0.01, "spread": 1.0}, 1.0, np.array([1e-3, 0.01, 0.1])).round(-3)
     array([1175000.     +0.j,  826000.+234000.j,   54000.+112000.j])

@@ -121,7 +121,15 @@ class StiffnessForm(NamedTuple):
     joined: Callable[[Array, Array, Array], Array]
 
     def in_units(self, table: StiffnessTable, units: UnitSystem) -> tuple[Array, Array, Array]:
-        """Convert a stiffness table to frequency and two real columns, such as K and damping, in units of the deck."""
+        """Convert a stiffness table to the frequency and the two real quantities of this format, such as K and damping.
+
+        Args:
+            table: complex stiffness over frequency [SI].
+            units: unit system of the deck.
+
+        Returns:
+            Frequency and the two quantities in the units of the deck, (n,) each.
+        """
         frequency = table.frequency * units.frequency.factor
         factor = units.display(table.direction.motion).stiffness.factor
         return frequency, *self.parts(frequency, table.stiffness * factor)
@@ -210,7 +218,7 @@ def format_real(value: float, digits: int = 5) -> str:
 
 
 def encode_deck(lines: Iterable[str]) -> bytes:
-    """Encode the lines of a deck in ASCII."""
+    """Join the lines of a deck, each with a line feed, and encode them; all characters must be ASCII."""
     return ("\n".join(lines) + "\n").encode("ascii")
 
 

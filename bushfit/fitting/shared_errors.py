@@ -46,8 +46,9 @@ class SharedErrors:
 
         Args:
             group: index of the group of each point, (n,).
-            change: change of the gain residuals, then of the phase residuals, due to an error of 1, (2 n,).
-            deviations: standard deviations of the gain and the phase error of each group.
+            change: change of the n whitened gain residuals due to a relative gain error of 1, then of the n phase
+                residuals due to a phase error of 1 rad, (2 n,).
+            deviations: standard deviations of the relative gain error and of the phase error [rad] of each group.
 
         Returns:
             Errors with one direction for the gain of each group, in order, then one for each phase.

@@ -104,7 +104,7 @@ def predict_resonance(
     base = base_acceleration / (2.0 * np.pi * frequency) ** 2
 
     def shaken(model: Model) -> PredictedResonance:
-        """Response of the mass predicted with one model, without warnings."""
+        """Response of the mass to the shaken base, predicted with one model; warnings are added later."""
         stiffness_at = partial(model.stiffness, place, frequency, conditions=conditions)
         amplitude, ratio = shaken_response(stiffness_at, mass, frequency, base)
         stiffness = stiffness_at(amplitude)

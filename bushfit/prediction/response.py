@@ -88,7 +88,11 @@ class TimeResponse:
 
 
 def work(history: History, force: Array) -> float:
-    """Work of a force [N, N m or Pa], (n,), over a motion [m, rad or 1] from its first to its last sample [J]."""
+    """Work done on the bushing by a force [N, N m or Pa], (n,), from the first to the last sample of a motion.
+
+    Returns:
+        Work [J], or work per volume [J/m^3] of a stress over a strain.
+    """
     if history.periodic:
         return float(np.sum(force * history.rate) * history.step)
     return float(np.trapezoid(force, history.value))

@@ -31,7 +31,7 @@ def _expand(name: str) -> list[str]:
 
 
 def _columns_of(test: str) -> dict[str, list[str]]:
-    """Names of the columns of a kind of test, by role; `test` is the name of its table in words.toml."""
+    """Accepted column names for each role, such as "force", in a kind of test: the table `test` of words.toml."""
     return {role: [full for name in names for full in _expand(name)] for role, names in WORDS[test].items()}
 
 

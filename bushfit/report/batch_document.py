@@ -72,7 +72,7 @@ class PartTable:
 
 @dataclass(frozen=True, kw_only=True)
 class BatchFile:
-    """Results of a batch: the content of batch.json.
+    """Results of a batch, as in batch.json and, with two more fields, in the output of `--json`.
 
     Args:
         schema: name and version of the layout of this file.
@@ -91,7 +91,7 @@ class BatchFile:
         warnings: warnings on the batch, the important ones first.
         detectable: smallest deviation of an outlying part, in standard deviations; null below five parts.
         quantities: scatter, limits and capability of each quantity, by column of the table.
-        curve_points: columns of the measured stiffness curve.
+        curve_points: names of the columns of the batch table with the measured stiffness at each frequency.
         parts: all parts, in the order of the manifest.
     """
 

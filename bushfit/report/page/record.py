@@ -32,16 +32,16 @@ _LARGEST = 500_000_000
 
 
 def tested_tables(tables: Mapping[str, pd.DataFrame]) -> dict[str, pd.DataFrame]:
-    """Select the tables of measured and modelled tests: `gap`, `sweeps`, `loops`, and validation records.
+    """Select the tables of measured and modelled tests: `gap`, `sweeps`, `loops`, and `validation_...`.
 
-    A diagnosis writes no tables of sweeps and loops. Its table of the gap has the same columns, with a row for each
-    point of a sweep and each row of a loop.
+    A diagnosis writes no tables `sweeps` and `loops`. They are made from its table of the gap, which has the same
+    columns, with a row for each point of a sweep and each row of a loop.
 
     Args:
         tables: tables of a result by file name.
 
     Returns:
-        The selected tables by file name; rows of the gap where tables `sweeps` and `loops` are missing.
+        The selected tables by file name, with `sweeps` and `loops` made from `gap` if they are missing.
     """
     tested = {name: tables[name] for name in ("gap", "sweeps", "loops") if name in tables}
     if "gap" in tested:

@@ -110,7 +110,7 @@ class Chart(Figure):
 
     Attributes:
         heading, footer: matplotlib texts above and below the panels.
-        caption: explanation without the note, in one line, for use in a page.
+        caption: the sentences given to `explain`, without its note, in one line, for use in a page.
     """
 
     def __init__(self, title: str, height: float) -> None:
