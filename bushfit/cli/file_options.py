@@ -1,5 +1,7 @@
 """Options for metadata that test files do not contain, and errors that name these options."""
 
+from __future__ import annotations
+
 import os
 import re
 import tomllib

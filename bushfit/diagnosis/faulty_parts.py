@@ -130,6 +130,9 @@ def is_pattern(faulty_parts: Sequence[FaultyPart]) -> bool:
     - two or more frequencies of a sweep, as by a resonance, or the same frequency in every direction;
     - the smallest or the largest level, as by a contact;
     - two loops of the same direction, rate and amplitude.
+
+    Returns:
+        True for a pattern.
     """
     if sum(part.family == "frequency" for part in faulty_parts) > 1 or any(
         part.may_be_physics for part in faulty_parts
