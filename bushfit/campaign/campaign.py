@@ -219,7 +219,7 @@ def model_of(campaign: Campaign) -> Model:
         raise CampaignError(
             "the campaign does not state what to simulate",
             file=campaign.path,
-            expected="a [simulate] table with parameters",
+            expected="a [simulate] table that states the material parameters",
             hint="or fit the campaign first and simulate its model.json",
         )
     values = campaign.simulate.parameters

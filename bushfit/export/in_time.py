@@ -95,7 +95,7 @@ def time_model(request: ExportRequest) -> TimeModel:
                 found="a law for the steady first harmonic only"
                 if effect.harmonic_only
                 else "a law that the FMU sources lack",
-                expected="effects with a law in time",
+                expected="effects whose force can be computed over time",
                 hint="fit a model without it, or export the stiffness over frequency and amplitude in another format",
             )
     # loops are slow, and a triangle has overtones: two decades below and one above the frequencies of fit and grid

@@ -91,7 +91,7 @@ def radial_stiffness(a: float, b: float, length: float) -> float:
             "the radial formula (Eqs. 11, 12) was not checked for this shape",
             place="inner_radius, outer_radius, length",
             found=f"inner/outer = {a / b:.3g}, length/outer = {length / b:.3g}",
-            expected="inner/outer 0.1 to 0.97 and length/outer 0.05 to 100",
+            expected="inner radius 0.1 to 0.97 times and length 0.05 to 100 times the outer radius",
             hint="check the units of the geometry; the axial direction has no such limit",
         )
     q = _area(a, b) / (a * a + b * b)

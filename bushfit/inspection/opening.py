@@ -105,7 +105,7 @@ def read_history(file: Path, test_options: Mapping[str, Any]) -> tuple[Loop, Dir
         raise table.header_error(
             "this is a sweep already",
             expected="a raw history: time, displacement, force",
-            hint="name it in the campaign under [[sweeps]]",
+            hint="list this file in the campaign under [[sweeps]]",
         )
     direction = test_direction(file, table, test_options)
     entry = campaign_entry(table, direction, test_options, is_sweep=False)

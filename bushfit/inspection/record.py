@@ -218,7 +218,7 @@ def campaigns_of_parts(
             file=unknown[0].file,
             found=f"specimens {', '.join(of_parts)} in other files",
             expected="a specimen number in every file, or files of a single part",
-            hint="--specimen-number selects the tests of one part, and applies to files without such a column",
+            hint="--specimen-number selects the tests of one part; files that state no part are included",
         )
     texts = {listed_in: f"# a campaign of each part: bushfit batch {listed_in}\n"}
     for number, (part, tests) in enumerate(of_parts.items(), start=1):

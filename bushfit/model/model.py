@@ -120,7 +120,7 @@ class Model:
                 "an effect of the model has no law in time, which this calculation needs",
                 place=" and ".join(names),
                 found="a law for the steady first harmonic only",
-                expected="effects with a law in time",
+                expected="effects whose force can be computed over time",
                 hint="use a model without this effect, or predict the steady state",
             )
 

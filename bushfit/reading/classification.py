@@ -173,7 +173,7 @@ def _stated_indices(table: Table, vocabulary: Vocabulary, columns: Mapping[str, 
                 "one column is named for two roles",
                 found=f'"{text}" for the {first_role.replace("_", " ")} and the {role.replace("_", " ")}',
                 expected="a column for each",
-                hint=f'name another column for one of them: columns = {{ {role} = "..." }} in the campaign',
+                hint=f'state another column for one of the two: columns = {{ {role} = "..." }} in the campaign',
             )
     for role, text in columns.items():
         number = int(text) if text.isdecimal() and len(text) < 5 else 0

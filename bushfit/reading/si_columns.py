@@ -77,7 +77,7 @@ def si_column(table: Table, role: str, tested: Place, hint: str | None = None) -
     if column.unit is None and column.logarithm:
         raise unclear(
             f"the logarithms of the {label} have no unit",
-            expected="the reference, such as dB re 1 N/mm, or the unit, such as log10(N/mm)",
+            expected="the reference of decibels, such as dB re 1 N/mm, or the unit, as in log10(N/mm)",
             hint=f'if the value 0 means 1 {example}, write units = {{ {role} = "{example}" }} in the campaign',
         )
     if column.unit is None and (expected != "1" or role in OF_MOTION):

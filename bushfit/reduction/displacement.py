@@ -164,7 +164,7 @@ def _smooth_displacement(channel: DisplacementHistory, frequency: float, *, stea
             "the low-pass does not suit the history",
             place="lowpass",
             found=f"{number(frequency, 4)} Hz",
-            expected=f"from {low} Hz, one cycle in the history, to below {high} Hz, half of the sampling rate",
+            expected=f"at least {low} Hz (one cycle in the history) and below {high} Hz (half of the sampling rate)",
         )
     from scipy.signal import butter, sosfiltfilt
 

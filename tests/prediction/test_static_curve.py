@@ -159,7 +159,7 @@ def test_a_vanishing_motion_changes_nothing_and_the_band_is_that_of_the_harmonic
     ("effect", "motion", "words"),
     [
         ("maxwell", LargeMotion(1e-3, "m", 1e-4), "is not fast compared with the slow motion"),
-        ("kraus", LargeMotion(1e-3, "m"), "a law in time"),
+        ("kraus", LargeMotion(1e-3, "m"), "computed over time"),
     ],
 )
 def test_what_it_cannot_answer(paper_model, effect, motion, words):
