@@ -37,7 +37,7 @@ def parse_motion(text: str) -> LargeMotion:
 
 @command_called("predict", 'data/arm_bushing/truth.json --frequencies "10:100:10 Hz" --amplitudes "0.1, 0.5 mm"')
 @click.argument("model", metavar="MODEL", type=FILE)
-@prediction_options("Use the frequencies and amplitudes of this campaign, and show its measured sweeps.")
+@prediction_options("Use the frequencies and amplitudes of this campaign, and show its measured sweeps.", static=True)
 @option_group(
     "Further predictions",
     option(
@@ -57,7 +57,11 @@ def parse_motion(text: str) -> LargeMotion:
         'vibrates with this acceleration, such as "0.1 g".',
         type=quantity("m/s^2"),
     ),
-    flag("--static", "Also write the static curve: force over displacement in a slow motion, and its slope."),
+    flag(
+        "--static",
+        "Also write the static curve: force over displacement in a slow motion, and its slope. The same as "
+        '--frequencies "0 Hz".',
+    ),
     static_rate_option("Rate of the static curve"),
     option(
         "--over MOTION",
@@ -90,6 +94,8 @@ def command(model: Path, campaign: Path | None, bushing: str | None, output: Out
     result, loaded = load_model(model), load_campaign(campaign) if campaign else None
     if (settings["mass"] is None) != (settings["base_acceleration"] is None):
         raise click.UsageError("'--mass' and '--base-acceleration' are needed together.")
+    if settings["frequencies"] == ():  # "0 Hz"
+        settings |= {"frequencies": None, "static": True}
     target = None if bushing is None else _bushing_of(result, bushing)
     predicted = predict(result, loaded, bushing=target, **settings)
     _print_summary(output, predicted)

@@ -89,10 +89,15 @@ def exit_above(max_nrmse: float | None, result: Result) -> None:
         click.get_current_context().exit(1)
 
 
-def grid_options(default: str) -> Parameter:
-    """Create the options for the frequencies and amplitudes of a prediction; `default` is the default in the help."""
+def grid_options(default: str, *, static: bool = False) -> Parameter:
+    """Create the options for the frequencies and amplitudes of a prediction.
+
+    Args:
+        default: default in the help.
+        static: True if "0 Hz", an empty grid, selects the static curve.
+    """
     options = [
-        option(f"--{name} GRID", words, type=grid(unit))
+        option(f"--{name} GRID", words, type=grid(unit, static=static and unit == "Hz"))
         for name, unit, words in (
             ("frequencies", "Hz", f'Frequencies: start:stop:step, "5:155:10 Hz", or a list, "20, 50 Hz" [{default}].'),
             ("amplitudes", "m", f'Displacement amplitudes, zero-to-peak, such as "0.1, 0.5 mm" [{default}].'),
@@ -107,12 +112,17 @@ def grid_options(default: str) -> Parameter:
     return lambda function: add_parameters(function, *options)
 
 
-def prediction_options(campaign: str) -> Parameter:
-    """Create --direction, the options of the grid, --temperature, and --campaign with the help text `campaign`."""
+def prediction_options(campaign: str, *, static: bool = False) -> Parameter:
+    """Create --direction, the options of the grid, --temperature, and --campaign.
+
+    Args:
+        campaign: help text of --campaign.
+        static: True if frequencies of "0 Hz" select the static curve.
+    """
     return option_group(
         "Range and conditions",
         direction_option("predict", "axial and radial, and all specimens"),
-        grid_options("from the campaign, else as tested"),
+        grid_options("from the campaign, else as tested", static=static),
         TEMPERATURE,
         file_option("--campaign", campaign),
     )
@@ -165,11 +175,12 @@ class Grid(tuple[float, ...]):
     text: str
 
 
-def grid(unit: str) -> Callable[[str], Grid]:
+def grid(unit: str, *, static: bool = False) -> Callable[[str], Grid]:
     """Make the parser of an option with a list "0.1, 0.2, 0.5 mm" or a range start:stop:step "5:155:10 Hz".
 
     Args:
         unit: SI unit of the values.
+        static: True if a single 0 is permitted; it gives an empty grid.
 
     Returns:
         Function that returns the SI values of a text, and raises a UnitError if it has no numbers or no such unit.
@@ -192,8 +203,11 @@ def grid(unit: str) -> Callable[[str], Grid]:
         is_range = ":" in parts[1]
         numbers = [parse_quantity(f"{number} {parts[2]}", unit) for number in parts[1].split(":" if is_range else ",")]
         hint = "predict --static writes the static curve" if unit == "Hz" and numbers[0] == 0.0 else None
-        values = Grid(regular_steps(*numbers) if is_range else numbers)
+        is_zero = static and numbers == [0.0]
+        values = Grid(regular_steps(*numbers) if is_range else () if is_zero else numbers)
         values.text = text
+        if is_zero:
+            return values
         if not values:
             raise UnitError("start:stop:step contains no value", found=text, expected=expected, hint=hint)
         if min(values) <= 0.0:

@@ -123,11 +123,12 @@ def test_predict_writes_maxwell_arms_where_asked(bushfit, root, tmp_path):
     assert 0.001 < json.loads(done.stdout)["arms"][0]["largest_relative_error"] <= 0.01, "where no error is given"
 
 
-def test_predict_writes_the_static_curve_at_the_rate_of_the_slowest_loop(bushfit, work, tmp_path):
+@pytest.mark.parametrize("request_", [("--static",), ("--frequencies", "0 Hz")])
+def test_predict_writes_the_static_curve_at_the_rate_of_the_slowest_loop(bushfit, work, tmp_path, request_):
     model = document(work / "model/model.json")
     (loop,) = (test for test in model["campaign"]["tests"] if test["kind"] == "loop")
     slow = 4.0 * loop["frequency_Hz"][0] * loop["amplitude"][1] * 60e3
-    done = bushfit("predict", "model/model.json", "--static", "-o", tmp_path / "x", "--json")
+    done = bushfit("predict", "model/model.json", *request_, "-o", tmp_path / "x", "--json")
     files = {f"{place}{end}" for place in ("axial", "radial") for end in (".csv", ".png", "_static.csv", "_static.png")}
     assert names(tmp_path / "x") == files
     table = pd.read_csv(tmp_path / "x/axial_static.csv")
