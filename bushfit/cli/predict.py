@@ -57,11 +57,7 @@ def parse_motion(text: str) -> LargeMotion:
         'vibrates with this acceleration, such as "0.1 g".',
         type=quantity("m/s^2"),
     ),
-    flag(
-        "--static",
-        "Also write the static curve: force over displacement in a slow motion, and its slope. The same as "
-        '--frequencies "0 Hz".',
-    ),
+    flag("--static", "Also write the static curve: force over displacement in a slow motion, and its slope."),
     static_rate_option("Rate of the static curve"),
     option(
         "--over MOTION",
