@@ -114,14 +114,12 @@ class HoldOut:
         skipped: parts that could not be held out.
         before: root mean square residual without the added effects, in units of noise; None if nothing can be held out.
         after: root mean square residual with the added effects, in units of noise; None if nothing can be held out.
-        whitened: before and after, in units of noise and prediction error combined.
     """
 
     parts: tuple[HeldOut, ...] = ()
     skipped: tuple[Skipped, ...] = ()
     before: float | None = None
     after: float | None = None
-    whitened: tuple[float, float] = (0.0, 0.0)
 
     @classmethod
     def from_residuals(cls, residuals: Mapping[str, Array], skipped: Sequence[Skipped] = ()) -> HoldOut:
@@ -137,7 +135,7 @@ class HoldOut:
             return cls((), tuple(skipped))
         figures = {name: _rms_values(pair) for name, pair in residuals.items()}
         overall = _rms_values(np.concatenate(list(residuals.values()), axis=-1))
-        return cls(tuple(HeldOut(name, *values) for name, values in figures.items()), tuple(skipped), *overall)
+        return cls(tuple(HeldOut(name, *values) for name, values in figures.items()), tuple(skipped), *overall[:2])
 
 
 def hold_out(before: FitResult, after: FitResult, bounds: Bounds) -> HoldOut:

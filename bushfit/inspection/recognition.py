@@ -161,7 +161,7 @@ def test_direction(file: Path, table: Table, test_options: Mapping[str, Any]) ->
     in_column = dict.fromkeys(table.row_labels.get("direction", (0, ()))[1])
     by_name = direction_of_file(file, (), turns=is_torsion, sheet=table.source.sheet)
     # test machines call the channels of their actuator axial, whatever the direction of the bushing
-    of_channels = direction_of_file(file, headers, turns=is_torsion)
+    of_channels = named_direction(headers)
     stated = Direction(*in_column) if len(in_column) == 1 else by_name or table.labels_above.direction
     option, in_text = test_options.get("direction"), named_direction(line.text for line in table.lines_above)
     is_doubtful = of_channels is Direction.AXIAL and (option or in_text not in (None, of_channels))

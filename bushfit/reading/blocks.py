@@ -9,7 +9,14 @@ from typing import NamedTuple
 from bushfit import units
 from bushfit.reading.headers import COUNTED, SWEEP_COLUMNS, Vocabulary, split_unit
 from bushfit.reading.layout import WITH_UNIT, Layout, Line, is_comment, is_row, is_summary_row, is_units_row
-from bushfit.reading.names import NO_LABELS, Labels, labels_above, labels_in_names, labels_in_text, named_direction
+from bushfit.reading.names import (
+    NO_LABELS,
+    Labels,
+    labels_above,
+    labels_and_text_above,
+    labels_in_names,
+    named_direction,
+)
 from bushfit.reading.numerals import is_like_number, plainest_value
 from bushfit.reading.roles import CONDITIONS
 from bushfit.reading.source import Channels, RowSource, Sheet, Text, cells_of
@@ -224,7 +231,7 @@ def _stacked_blocks(source: RowSource, layout: Layout, vocabulary: Vocabulary) -
 
 def _block_labels(block: Segment, title: str) -> Labels:
     """Labels of a block in the lines above it, the last of which is its title."""
-    labels = labels_above(block.above) | labels_in_names(title) | labels_in_text(block.above)
+    labels = labels_and_text_above(block.above) | labels_in_names(title)
     return replace(labels, direction=labels.direction or named_direction(line.text for line in block.above))
 
 
@@ -236,7 +243,7 @@ def _continued(before: Labels, labels: Labels) -> Labels:
 
 def _is_of_block(line: Line, conditions: set[str]) -> bool:
     """True if a line above the first block states a quantity, or one of the conditions, of this block alone."""
-    labels = labels_above([line]) | labels_in_text([line])
+    labels = labels_and_text_above([line])
     return bool(labels.quantities) or any(getattr(labels, key) for key in conditions)
 
 

@@ -2,7 +2,7 @@
 
 import re
 import unicodedata
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields
 from functools import reduce
 from operator import or_
@@ -203,11 +203,11 @@ def labels_above(lines: Iterable[Line]) -> Labels:
     return reduce(or_, map(_label_in_line, lines), Labels(convention=convention))
 
 
-def labels_in_text(lines: Iterable[Line]) -> Labels:
-    """Extract the temperature from running text above a table, if the text states one."""
+def labels_and_text_above(lines: Sequence[Line]) -> Labels:
+    """Labels of a test in lines above its table, and its temperature if running text above the table states one."""
     labels = [_labels_in_name(line.text) for line in lines if len(line.text) <= _LONGEST_TEXT]
     temperatures = {one.temperature for one in labels} - {None}
-    return Labels(temperature=temperatures.pop() if len(temperatures) == 1 else None)
+    return labels_above(lines) | Labels(temperature=temperatures.pop() if len(temperatures) == 1 else None)
 
 
 def _convention_in_line(line: Line) -> AmplitudeConvention | None:

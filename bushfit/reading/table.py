@@ -21,7 +21,7 @@ from bushfit.reading.instruments import word_for_part
 from bushfit.reading.labelled import find_labels
 from bushfit.reading.layout import Layout, Line, is_comment, is_row, is_summary_row
 from bushfit.reading.measurement import Floats
-from bushfit.reading.names import Labels, is_remark, labels_above, labels_in_text
+from bushfit.reading.names import Labels, is_remark, labels_and_text_above
 from bushfit.reading.numerals import ALL_NUMERALS, Numerals, find_first_decimal, find_numerals, is_like_number
 from bushfit.reading.parts import OpenedFile
 from bushfit.reading.rejected import (
@@ -255,7 +255,7 @@ class Table:
     @cached_property
     def labels_above(self) -> Labels:
         """Labels in the lines above the table, such as a temperature."""
-        return labels_above(self.lines_above) | labels_in_text(self.lines_above)
+        return labels_and_text_above(self.lines_above)
 
     @cached_property
     def remarks(self) -> tuple[str, ...]:
