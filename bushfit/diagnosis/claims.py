@@ -42,11 +42,11 @@ _RIDGE = 1e-12
 
 @dataclass(frozen=True, eq=False)
 class Claim:
-    """Hypothesis that the record of a campaign has one mistake, in one or several tests or in [bushing].
+    """Hypothesis of one recording mistake: a wrong unit, convention or dimension in some tests or in [bushing].
 
     Args:
         data: the campaign as it was read.
-        mistake: kind of mistake, such as a wrong unit, with its correction.
+        mistake: kind of mistake, such as amplitudes stated peak-to-peak, with its correction.
         tests: indices of the affected tests, loops before sweeps; empty for a mistake in [bushing].
     """
 
@@ -91,7 +91,7 @@ class Claim:
         )
 
     def corrected(self) -> PreparedCampaign:
-        """Campaign in which this mistake is corrected, in the tests or in the dimensions of the bushing.
+        """Correct this mistake in a copy of the campaign: in the affected tests, or in the dimensions of the bushing.
 
         Returns:
             The corrected campaign.
@@ -114,7 +114,7 @@ class Claim:
 
 
 def correct_adopted(data: PreparedCampaign, names: Collection[str]) -> tuple[PreparedCampaign, list[str]]:
-    """Correct the mistakes that the user adopts with the option --adopt.
+    """Correct the recording mistakes that the user confirms with the option --adopt.
 
     Args:
         data: the campaign as it was read.
@@ -124,7 +124,7 @@ def correct_adopted(data: PreparedCampaign, names: Collection[str]) -> tuple[Pre
         The corrected campaign, and one sentence for each mistake.
 
     Raises:
-        ModelError: a mistake that was not made in the test named, or no such test.
+        ModelError: the named mistake is not possible in this test, or the campaign has no such test.
     """
     messages = []
     for name in names:
@@ -143,11 +143,11 @@ def correct_adopted(data: PreparedCampaign, names: Collection[str]) -> tuple[Pre
 
 
 def claims(data: PreparedCampaign, without: Collection[str]) -> list[Claim]:
-    """List the possible mistakes in the record: each in one test, in all tests of a kind or direction, or in all tests.
+    """List possible recording mistakes, each in one test, in all tests of one kind or direction, or in all tests.
 
     Args:
         data: the campaign as it was read.
-        without: mistakes not to consider, "mistake" or "mistake:test".
+        without: values of the option --without, "mistake" or "mistake:test", which are left out.
 
     Returns:
         Hypotheses without duplicates.
@@ -195,7 +195,9 @@ class ClaimScreening:
     _responses: dict[tuple[Bushing | None, Place, bytes, bytes], Array] = field(default_factory=dict)
 
     def best(self, candidates: Sequence[Claim], limit: int) -> list[Claim]:
-        """Select the mistakes that change the misfit and may lower it in a fit, the smallest misfit first.
+        """Select the recording mistakes worth a refit: those whose correction may lower the misfit, the best first.
+
+        A correction that leaves the misfit as it is, such as one common factor of all stiffnesses, is not selected.
 
         Args:
             candidates: hypotheses of mistakes to compare.
@@ -208,13 +210,14 @@ class ClaimScreening:
         return [candidates[index] for index in better][:limit]
 
     def misfit(self, claim: Claim | None) -> float:
-        """Compute the least sum of squared residuals of the paper's model over its parameters.
+        """Smallest sum of squared residuals of the paper's five-parameter model, after correction of one mistake.
 
         Args:
             claim: mistake that is corrected first; None for the tests as recorded.
 
         Returns:
-            Sum of squared differences of the complex stiffness in units of a coarse noise; infinite without a response.
+            Sum of squared differences of the complex stiffness, divided by a coarse noise; infinite if the model has no
+            finite response.
         """
         bushing = self.data.campaign.bushing
         if claim and not claim.tests and bushing:
@@ -235,7 +238,7 @@ class ClaimScreening:
     def _test_products(
         self, index: int, data_set: MeasuredTest, mistake: Mistake | None, bushing: Bushing | None
     ) -> Array:
-        """Inner products of the stiffness per unit of mu, m and sigma_fmax with the measured stiffness of one test.
+        """Normal equations of one test: inner products of stiffness per unit of mu, m and sigma_fmax, and as measured.
 
         Args:
             index: index of the test, loops before sweeps.
@@ -244,7 +247,8 @@ class ClaimScreening:
             bushing: bushing with its dimensions, corrected if the mistake is in them; None without a bushing.
 
         Returns:
-            Matrix of products at each value of alpha and eps_half, (g, 4, 4).
+            Matrices of these four rows and columns (mu, m, sigma_fmax, measured) for g pairs of alpha and eps_half,
+            (g, 4, 4).
         """
         key = (index, mistake.name if mistake else "", bushing)
         if key not in self._products:
@@ -257,7 +261,7 @@ class ClaimScreening:
         return self._products[key]
 
     def _responses_of(self, bushing: Bushing | None, direction: Place, frequency: Array, amplitude: Array) -> Array:
-        """Complex stiffness per unit of mu, m and sigma_fmax at g values of alpha and eps_half, (g, 3, n).
+        """Complex stiffness per unit of mu, m and sigma_fmax for g pairs of alpha and eps_half, (g, 3, n).
 
         Args:
             bushing: bushing with its dimensions; None for tests of specimens.
@@ -278,10 +282,14 @@ class ClaimScreening:
 
 
 def _paraboloid_minimum(misfit: Array) -> float:
-    """Minimum of a sum of squared residuals given on a grid, from a paraboloid about the smallest grid value.
+    """Estimate the minimum of a sum of squares from its values on a grid, by a paraboloid about the smallest value.
 
     Args:
-        misfit: sum of squares in units of a coarse noise, (rows, columns).
+        misfit: sum of squares on a grid of alpha and eps_half, in units of a coarse noise, (rows, columns).
+
+    Returns:
+        Minimum of the paraboloid inside the fitted grid cells; the smallest grid value if the paraboloid has no
+        minimum.
     """
     row, column = (
         int(np.clip(i, 1, n - 2))

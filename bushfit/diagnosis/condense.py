@@ -33,7 +33,8 @@ class _ShortSweep(NamedTuple):
     Args:
         sweep: means over narrow bands, or the selected points.
         conditions: temperature and largest earlier strains at these points; points that are left out count as earlier.
-        noise_ratios: variance of the noise of a mean relative to that of one point, for each averaged level.
+        noise_ratios: variance of the noise of a mean relative to that of a single point, for each averaged level
+            (constant amplitude or frequency).
         sentence: sentence on the reduction, for the user.
     """
 
@@ -84,7 +85,7 @@ def shorten_tests(data: PreparedCampaign) -> tuple[PreparedCampaign, tuple[str, 
 def _select_loops(loops: Sequence[MeasuredLoop]) -> Sequence[MeasuredLoop]:
     """Select loops with at most `_MOST_ROWS` rows in total, but at least one loop of each direction.
 
-    Distinct loops, far apart in direction, amplitude and frequency, are selected before repeats.
+    Loops that differ most in direction, amplitude and frequency are selected first, repeats of a loop last.
     """
     sizes, directions = np.array([loop.size for loop in loops]), [str(loop.direction) for loop in loops]
     if sizes.sum() <= _MOST_ROWS:
@@ -157,7 +158,7 @@ def _average_points(data_set: MeasuredSweep, rows: Array, keys: Array) -> tuple[
     Args:
         data_set: the sweep.
         rows: indices of the points to keep, (n,).
-        keys: values by which points are grouped, (k, n).
+        keys: k values for each point, (k, n); points whose values are all equal are averaged.
 
     Returns:
         Sweep with one point for each of g groups, in the order of measurement; temperature and earlier strains at these

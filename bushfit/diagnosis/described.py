@@ -59,23 +59,22 @@ def describe(
     before: FitResult | None = None,
     has_candidates: bool = False,
 ) -> GapDescription | None:
-    """Describe the gap (measured minus modelled stiffness) by a correction smooth in ln frequency and ln strain.
+    """Correct a model by a smooth function of ln frequency and ln strain, for a gap that no known effect explains.
 
-    The form of the correction is the nearest power law of frequency and amplitude. Its form within a cycle is unknown,
-    so loops are represented by their first harmonic.
+    The correction is added to the stiffness and described by the nearest power law of frequency and amplitude. Its
+    force within a cycle is unknown, so loops are represented by their first harmonic.
 
     Args:
         fit: the fitted model and the tests.
         rig: stated accuracy class of the rig (gain and phase errors).
         start: starting values estimated from the data, because the gap distorts the fitted parameters.
         bounds: limits of parameters inside their general limits.
-        before: fit of the starting model, to compare held-out residuals with; None for `fit`.
-        has_candidates: True if known effects explain the gap, so that its form is known.
+        before: fit of the starting model, with whose held-out residuals the correction is compared; None for `fit`.
+        has_candidates: True if known effects may explain the gap; the power law is then not estimated.
 
     Returns:
-        The description; None without a valid correction: if it does not reduce the held-out residuals (a correction
-        with an error larger than the gap: by half of their excess over noise), if the model has a correction already,
-        or if the first harmonics cannot be fitted.
+        The corrected model with its description. None if the correction does not reduce the residuals of held-out
+        tests, if the model already has a correction, or if the first harmonics cannot be fitted.
     """
     if NAME in fit.model.effects:
         return None
@@ -156,7 +155,7 @@ def _hold_out_inside(before: FitResult, closest: FitResult, correction: Unnamed)
 
 
 def _validity(correction: Unnamed, whole: FitResult) -> str:
-    """Sentence on the tested range in which the correction is valid, and on the remaining misfit of the worst loop."""
+    """Sentence with the range of frequency and amplitude of the correction, and the misfit of the worst loop."""
 
     def span(values: Sequence[float], factor: float = 1.0) -> str:
         return " to ".join(number(factor * end, 2) for end in (min(values), max(values)))

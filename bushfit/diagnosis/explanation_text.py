@@ -45,12 +45,12 @@ def causes_text(candidates: Sequence[Composition], finding: Finding) -> list[str
     """List sentences on the possible causes of a gap.
 
     Args:
-        candidates: explanations with causes, the most probable first.
-        finding: verdict, with all explanations and leads.
+        candidates: explanations by effects or recording mistakes, the most probable first.
+        finding: verdict, with all reported explanations and its leads (effects that reduce the gap without closing it).
 
     Returns:
-        Sentences on the candidates with their probabilities and on leads (effects that reduce the gap without closing
-        it) that no candidate has; or on the mistakes to check.
+        If every reported explanation is a recording mistake, one sentence that asks to check them. Otherwise a sentence
+        on the candidates with their probabilities, and one on the leads that no candidate contains.
     """
     claims = {c.best.claim.key if c.best.claim else None: c.best.claim for c in finding.reported}
     if all(claims.values()):
@@ -92,7 +92,7 @@ def explanation_odds(finding: Finding) -> Odds:
 def list_candidates(
     search: Search, hypotheses: Sequence[Hypothesis], first: Composition | None
 ) -> list[CandidateResult]:
-    """List all effects that the starting model lacks, and all mistakes that were tried, each with its result.
+    """List the result of every effect that the starting model lacks and of every recording mistake that was tried.
 
     Args:
         search: completed search, with the tests.

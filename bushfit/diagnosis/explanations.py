@@ -12,16 +12,17 @@ _UNSEEN = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Group:
-    """Changes of the residuals that one explanation of a gap would cause: c columns with Gaussian amounts.
+    """Changes of the residuals that one explanation of a gap would cause: c columns, each with an unknown amount.
 
     Args:
         columns: change of the n whitened residuals per unit amount of each column, (c, n).
-        unit: relative change of |K| per unit amount of each column, (c,); complex, at p operating points, (c, p), if
-            `act_together`.
-        act_together: True if all columns act at once with independent amounts of one prior size; False if exactly one
-            column acts, each with equal probability.
+        unit: relative change of |K| per unit amount of each column, (c,); if `act_together`, the complex relative
+            change of the stiffness at p operating points, (c, p).
+        act_together: True if all columns act at once, with independent amounts of the same prior standard deviation;
+            False if only one column acts, each with equal probability.
         sign: +1 if only positive amounts are possible (only without `act_together`); else 0.
-        covered_rows: slice of the residuals that `columns` covers, and the number of all residuals; None for all.
+        covered_rows: slice of the residuals that `columns` changes, and the number of all residuals; None if `columns`
+            has all.
     """
 
     columns: Array
@@ -49,8 +50,8 @@ class Group:
     def scaled(self) -> Array:
         """Changes of all n residuals for the c columns, scaled for the prior of their amounts, (c, n).
 
-        If the columns are alternatives, each is divided by its change of |K|, so that an amount of 1 changes |K| by
-        100 %, and is zero if it does not change |K|. Columns that act together are not scaled.
+        If only one of the columns acts, each is divided by its relative change of |K|, so that an amount of 1 changes
+        |K| by 100 %. A column that does not change |K| becomes zero. Columns that act together are not scaled.
         """
         if self.act_together:
             return self.whole
@@ -63,10 +64,10 @@ class Explanation:
     """Possible explanation of a gap between model and tests, with the changes of the residuals that it would cause.
 
     Args:
-        kind: "effect", "part" (faulty part of the tests), "unnamed" (smooth curve) or "record" (mistake in the record);
-            each kind has a prior probability, which its families share.
-        family: name of the explanations that share a prior probability: an effect in all directions, or a kind of
-            faulty part.
+        kind: "effect", "part" (faulty part of the tests), "unnamed" (smooth curve) or "record" (recording mistake).
+            Each kind has a prior probability, which is divided among its families.
+        family: name common to explanations that share one prior probability: an effect (whatever its direction), or a
+            kind of faulty part.
         name: name of the explanation.
         group: changes of the residuals that the explanation would cause; None for an effect that replaces a branch of
             the model and therefore needs a refit.

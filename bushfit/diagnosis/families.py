@@ -111,7 +111,7 @@ def known_families(model: Model, data_sets: Sequence[MeasuredTest]) -> tuple[str
 
 
 def _can_add(model: Model, name: str) -> bool:
-    """True if the named effect can be added to a model, which must have the branch that the effect replaces."""
+    """True if a model has the branch that the named effect would replace, or if the effect replaces none."""
     return name not in model.effects and get_effect(name).replaces in (None, *model.effects)
 
 
@@ -163,10 +163,10 @@ def fit_families(
 def _chain(
     chains: Mapping[str, list[FitResult]], first: FitResult, name: str, fixed: Sequence[str], bounds: Bounds
 ) -> list[FitResult]:
-    """Fit a model family effect by effect, starting from the fits of the family without its last effect.
+    """Fit a model family effect by effect; the fits of the family without its last effect are reused.
 
     Args:
-        chains: fits of the families so far, by name, each with one more effect than the fit before.
+        chains: fits of the families so far, by name: without added effects, with one, with two, and so on.
         first: fit of the campaign's model.
         name: name of the family: names of effects joined by +.
         fixed: names of parameters that are not fitted.
@@ -204,7 +204,7 @@ def _log_evidence(chain: Sequence[FitResult], names: Sequence[str], bounds: Boun
 def _gain(
     predictions: Mapping[str, Predicted], data_sets: Sequence[MeasuredTest]
 ) -> tuple[tuple[float, float, float] | None, float | None]:
-    """Compute the reduction of the mean square held-out residual by a family, compared with the first family.
+    """Compute by how much a family's mean square held-out residual is smaller than that of the first family.
 
     Args:
         predictions: residuals of each held-out part by both families, by name of the part.
@@ -215,10 +215,9 @@ def _gain(
         for both if nothing is held out.
 
     Notes:
-        By the delta method the variance of the gain is the sum, over the rows of all tests, of the squared derivative
-        by the noise of each row, times the smaller mean square, at least 1. A row that is not held out contributes
-        through the parameters. Nonlinearity and the estimated noise increase the variance further, see
-        `_BEYOND_LINEAR`.
+        By the delta method, the variance of the gain is the sum over all rows of the squared derivative with respect to
+        the noise of the row, times the smaller mean square (at least 1). A row that is not held out contributes through
+        the fitted parameters. The factor `_BEYOND_LINEAR` accounts for nonlinearity and the estimated noise.
     """
     disjoint, used_rows = list[Predicted](), np.zeros(sum(data_set.size for data_set in data_sets), dtype=bool)
     for part in hold_out_parts(data_sets):

@@ -65,12 +65,12 @@ class FaultyPart(Explanation):
 
     @property
     def columns(self) -> Array:
-        """Changes of the n whitened residuals per unit of c errors: gain, phase [rad] and their slopes, (c, n)."""
+        """Changes of all n whitened residuals per unit of each of c errors: gain, phase [rad] and their slopes, (c, n)."""
         assert self.group is not None
         return self.group.whole
 
     def point_by_point(self) -> FaultyPart:
-        """Fault of the same sweep points, each with an independent error in place of a common shift or slope.
+        """Replace the common shift and slope of this part by an independent error of each of its points.
 
         Returns:
             Faulty part with one column for each residual of its points.
@@ -82,11 +82,11 @@ class FaultyPart(Explanation):
         return replace(self, group=Group(columns, np.eye(rows.size), act_together=True), is_scattered=True)
 
     def region(self, residual: Array, change: float) -> MisfitRegion:
-        """Region of disagreement that this faulty part is.
+        """Describe this faulty part as a region in which tests and model disagree, for the report.
 
         Args:
             residual: whitened residuals of all tests, (n,).
-            change: deviation of the part from all other tests, relative to |K|.
+            change: deviation of the part from the model, relative to |K|.
         """
         kind, component = ("loop", "force") if self.family == "loop" else ("sweep", "storage")
         reading = f"{self.name}: a deviation of {number(100 * change, 2)} % from all other tests"
@@ -159,8 +159,8 @@ def outlier_clusters(
         One explanation for each frequency with two or more outliers.
 
     Notes:
-        Single wrong rows may coincide by chance. For n such rows, the probability of k at the frequency of one of them
-        is that of k - 1 or more among the other n - 1 (binomial, with p = 1 / number of frequencies).
+        Single wrong rows may have the same frequency by chance. The probability that k of n wrong rows do is the
+        binomial probability of k - 1 or more among n - 1, with p = 1 / number of frequencies.
     """
     distances = {(outlier.test, outlier.row): outlier.distance for outlier in outliers}
     points_by_frequency: dict[float, list[tuple[MeasuredSweep, int, float]]] = defaultdict(list)
@@ -235,7 +235,10 @@ def _level_label(sweep: MeasuredSweep, point: int) -> str:
 
 
 def _levels(fit: FitResult, sweeps: Sequence[MeasuredSweep]) -> Iterator[FaultyPart]:
-    """Generate suspected faults: each level, if there are several, and each repeat of a level with three or more."""
+    """Generate suspected faults of levels (constant amplitude or frequency), and of single repeats of a level.
+
+    A level is suspected only if the sweep has several, a repeat only if the level has three or more.
+    """
     for sweep in sweeps:
         levels_of_direction = [np.unique(member.held_value) for member in sweeps if member.direction == sweep.direction]
         levels = np.concatenate(levels_of_direction)
@@ -315,7 +318,7 @@ def _common_fault(
     columns: Array | None = None,
     unit: Array = _SLOPING,
 ) -> FaultyPart:
-    """Explanation of a gap by errors that some sweep points share: of gain and phase, and of their slopes.
+    """Explanation of a gap by errors of gain and phase, and their slopes, that some points of sweeps have in common.
 
     Args:
         fit: the fitted model and the tests.
@@ -346,7 +349,8 @@ def _shift_columns(
         fit: the fitted model and the tests.
         sweeps: sweeps with the errors.
         chosen: mask of the points with the errors in each sweep, (n,) each.
-        sloping: True to add the same errors times a slope along the log of the stepped quantity.
+        sloping: True to add gain and phase errors that vary linearly with the log of the stepped quantity (frequency or
+            amplitude).
 
     Returns:
         Changes of the residuals of all rows from the first to the last of `sweeps`, (2, rows), or (4, rows) with

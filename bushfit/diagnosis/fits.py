@@ -76,7 +76,8 @@ def fit_rivals(
         start: further starting values, by parameter.
         fixed: names of parameters that are not fitted.
         bounds: limits of parameters inside their general limits.
-        columns: common errors of all tests, as residuals per standard deviation, (c, n); None without such errors.
+        columns: errors that the tests have in common: change of the whitened residuals per standard deviation of each
+            of c errors, (c, n); None without such errors.
 
     Returns:
         Fits by the name of the effect; fits far behind the best, and effects without a response, are left out.
@@ -109,16 +110,17 @@ def fit_rivals(
 
 
 def within_reach(model: Model, data_sets: Sequence[MeasuredTest]) -> Bounds:
-    """Limits of the shape parameters of effects to the range that the tests can show.
+    """Bounds of the effects' shape parameters (all but amounts) within which the tests can distinguish their values.
 
-    For example, a stop that is always in contact is a spring, and a resonance far above all frequencies is a mass.
+    Beyond these bounds an effect becomes another one: a stop that is always in contact is a spring, and a resonance far
+    above all frequencies is a mass.
 
     Args:
         model: model with the effects.
         data_sets: the tests.
 
     Returns:
-        Lower and upper limit by parameter name.
+        Lower and upper bound by parameter name.
     """
     tried = {
         qualified_name(effect, parameter): shape_start_values(data_sets, model, parameter)
@@ -139,24 +141,25 @@ def result_of(
     rig: RigSettings = UNSTATED,
     fixed: Covariance | None = None,
 ) -> Result:
-    """Build the result of a fit, with its uncertainty; a parameter at a bound is treated as fixed.
+    """Build the result to report from a fit: model, uncertainty, misfit and warnings.
 
     Args:
         fit: the fitted model and the tests.
         bounds: limits of parameters inside their general limits.
-        resolved: names of effects known to belong to the bushing and not to the rig; the model's other effects with a
-            twin in the rig are reported as unresolved.
-        lacking: False if the record of the tests has a mistake, so that no error of the model is estimated.
-        corrected: fit together with a smooth correction of the model; None if the model has no correction.
+        resolved: names of effects that are known to be in the bushing. Any other effect with a twin (an effect of the
+            rig with the same response) is reported as unresolved.
+        lacking: True to estimate an error of the model from the misfit; False if the misfit is due to a recording
+            mistake.
+        corrected: fit in which a smooth correction of the model is a random error; None if the model has no correction.
         rig: stated accuracy class of the rig (gain and phase errors).
-        fixed: covariance of parameters that the fit kept fixed; None if these are exact.
+        fixed: covariance of the parameters that the fit kept fixed; None if their values are exact.
 
     Returns:
         The model with covariance, quality, range, warnings and expected error.
     """
 
     def with_levels(errors: LevelErrors) -> FitResult:
-        """Repeat the fit with noise that contains errors shared by all runs of a level."""
+        """Repeat the fit with a further error, added to the noise, that all runs of a level have in common."""
         tests = with_level_errors(fit.problem.tests, errors.error, errors.freedom)
         return Descent.start(replace(fit.problem, model=fit.model, tests=tests)).run(EVALUATIONS).solution
 
@@ -177,7 +180,7 @@ def result_of(
 
 
 def misfit_covariance(fit: FitResult) -> Covariance:
-    """Covariance of the parameters that are not at a bound, larger by the reduced chi-square of a fit with a misfit."""
+    """Covariance of the fitted parameters that are not at a bound, times the reduced chi-square if it exceeds 1."""
     free = fit.jacobian[fit.moving]
     matrix = np.linalg.pinv(free @ free.T, rcond=1e-12, hermitian=True)
     matrix *= max(fit.chi_square / max(fit.residual.size - len(matrix), 1), 1.0)  # what the fit misses

@@ -45,12 +45,13 @@ def posterior(gram: Array, projections: Array) -> tuple[Array, Array, Array, Arr
     """Posterior of the amounts of columns that act together, for each prior size in `priors.SIZES`.
 
     Args:
-        gram: inner products U^T P U of the columns, (..., width, width).
-        projections: inner products U^T P r with the residuals, (..., width).
+        gram: inner products U^T P U of the columns U; P is the inverse covariance of the residuals r with the model's
+            parameters projected out, (..., width, width).
+        projections: inner products U^T P r of the columns with the residuals, (..., width).
 
     Returns:
-        Gain in log evidence, (..., sizes); mean amounts, (..., sizes, width); variances along the eigenvectors of
-        `gram`, (..., sizes, width); and these eigenvectors, (..., width, width).
+        Increase of the log evidence by the columns, (..., sizes); mean amounts, (..., sizes, width); variances along
+        the eigenvectors of `gram`, (..., sizes, width); and these eigenvectors, (..., width, width).
     """
     values, vectors = (gram[..., 0], np.ones_like(gram)) if gram.shape[-1] == 1 else np.linalg.eigh(gram)
     projections = np.einsum("...ij,...i->...j", vectors, projections)[..., None, :]
@@ -62,18 +63,18 @@ def posterior(gram: Array, projections: Array) -> tuple[Array, Array, Array, Arr
 
 
 def largest_gain(gram: Array, projections: Array) -> Array:
-    """Largest gain in log evidence by columns that act together, over the prior sizes `priors.SIZES`.
+    """Largest increase of the log evidence by columns that act together, over the prior sizes `priors.SIZES`.
 
     Args:
-        gram: inner products U^T P U of the columns, (..., width, width).
+        gram: inner products U^T P U of the columns U, see `posterior`, (..., width, width).
         projections: inner products U^T P r with the residuals, (..., width).
 
     Returns:
         Largest gains, (...).
 
     Notes:
-        The last row of the Cholesky factor of [[1 + v^2 U^T P U, v U^T P r], [., c]] has the squared norm
-        v^2 r^T P U (1 + v^2 U^T P U)^-1 U^T P r. For many columns this is faster than the eigenvalues of `posterior`.
+        The last row of the Cholesky factor of [[1 + v^2 U^T P U, v U^T P r], [., c]] has the squared norm v^2 r^T P U
+        (1 + v^2 U^T P U)^-1 U^T P r. For many columns this is faster than the eigenvalues of `posterior`.
     """
     width, gains = gram.shape[-1], list[Array]()
     bordered = np.zeros((*gram.shape[:-2], width + 1, width + 1))
@@ -89,12 +90,12 @@ def largest_gain(gram: Array, projections: Array) -> Array:
 
 
 def block_gains(batch: Batch, projections: Array, gram: Array) -> tuple[Array, Array]:
-    """Gains in log evidence and squared relative changes of |K| of each block, for each prior size of its amounts.
+    """Increase of log evidence, and squared relative change of |K|, by each block for each prior size of its amounts.
 
     Args:
-        batch: blocks of columns that act together.
-        projections: inner products U^T P r with the residuals, (cases, blocks, width).
-        gram: inner products U^T P U within the blocks, (cases, blocks, width, width).
+        batch: blocks of columns that act together; an explanation may have several blocks, of which only one acts.
+        projections: inner products U^T P r of the columns U of each block with the residuals r, (cases, blocks, width).
+        gram: inner products U^T P U of the columns of each block, (cases, blocks, width, width).
 
     Returns:
         Gains and squared changes for each of `priors.SIZES`, (cases, blocks, sizes) each.
@@ -107,7 +108,7 @@ def block_gains(batch: Batch, projections: Array, gram: Array) -> tuple[Array, A
 
 
 def average(groups: Array, log_evidence: Array, changes: Array) -> list[GroupEvidence]:
-    """Average the evidence for explanations over noise cases, blocks and prior sizes of the amounts.
+    """Average the evidence of each group over noise cases, blocks and prior sizes of the amounts.
 
     Args:
         groups: index of the group of each block, ascending, (blocks,).

@@ -204,7 +204,7 @@ class Predicted(NamedTuple):
 
 
 def _leave_out(fit: FitResult) -> LeaveOut:
-    """Linearise a fit, to predict it without some rows; parameters at a bound are fixed."""
+    """Linearise a fit so that residuals without some rows can be predicted; parameters at a bound are fixed."""
     return LeaveOut.from_fit(fit.jacobian[fit.moving], fit.residual)
 
 
@@ -243,7 +243,14 @@ def _predict(fit: FitResult, leave_out: LeaveOut, part: HoldOutPart, bounds: Bou
 
 
 def _clusters(data_sets: Sequence[MeasuredTest], count: int) -> Array:
-    """Index of the level or loop that each of `count` residuals belongs to; residuals of priors have an index each."""
+    """Number of the level or loop to which each of the tests' residuals belongs, (count,).
+
+    Residuals whose errors are correlated have the same number. Further residuals, of priors, have a number each.
+
+    Args:
+        data_sets: the tests.
+        count: number of residuals, with those of priors after those of the tests.
+    """
     numbers, first = list[Array](), 0
     for data_set in data_sets:
         level = np.zeros(data_set.size // data_set.residuals_per_point, dtype=int)

@@ -41,8 +41,8 @@ class Hypothesis:
         last: explanation that is not fitted in `state` and whose evidence is from the linearised model; None if all are
             fitted.
         last_change: relative change of |K| due to the last explanation or the compound's deviation; 0 without either.
-        compound_deviates: True if the compound deviates from the model's laws in addition.
-        levels: True if errors of amplitude levels are larger than the accuracy class of the rig allows.
+        compound_deviates: True if the hypothesis includes a smooth deviation of the rubber from the model's laws.
+        levels: True if the hypothesis includes rig errors of whole levels larger than the rig's accuracy class allows.
         clusters: disturbances at frequencies with several outliers that were left out.
     """
 
@@ -164,16 +164,16 @@ class SearchState:
 
     @cached_property
     def has_influence(self) -> Array:
-        """Mask of the fit's parameters that change the predicted tests and are not at an end of a shape's range.
+        """Mask of the fit's parameters that change the predicted tests and are not at an end of their range, (k,).
 
-        A parameter changes nothing if an effect replaces the branch on which it acts.
+        A parameter has no influence if an effect replaces the branch of the model in which it acts.
         """
         precision = np.array([self.precision.get(name, 0.0) for name in self.bare.names])
         return np.isfinite(precision) & self.bare.jacobian.any(axis=1)
 
     @cached_property
     def linear(self) -> LinearModel:
-        """Residuals linearised at the fit, from which the evidence is computed for each noise case of the rig."""
+        """Residuals linearised at the fit, to compute the evidence for further explanations."""
         bare, moves, columns = self.bare, self.has_influence, self.columns
         precision = np.array([self.precision.get(name, 0.0) for name in bare.names])[moves]
         common = [part for part in self.faulty_parts if not part.is_scattered]
@@ -183,14 +183,14 @@ class SearchState:
 
     @cached_property
     def columns(self) -> ExplanationColumns:
-        """Further explanations beside the errors of the rig and of faulty parts whose points deviate independently."""
+        """Columns of the residuals for further explanations, given the scatter of the faulty parts in this state."""
         scattered = [part.amount * part.columns for part in self.faulty_parts if part.is_scattered]
         variances = [np.square(columns).sum(axis=0) for columns in scattered]
         return self.tests.columns.with_variance(np.sum(variances, axis=0)) if variances else self.tests.columns
 
     @property
     def log_posterior(self) -> float:
-        """Natural log of prior times evidence of this state's explanations, with or without a compound deviation."""
+        """Natural log of prior times evidence of this state, summed over rubber with and without a smooth deviation."""
         return self.log_weight + self.linear.evidence.total
 
     @cached_property
@@ -212,17 +212,18 @@ class SearchState:
 
     @property
     def likeliest_deviation(self) -> float:
-        """Likeliest standard deviation of the compound's deviation, relative to |K|; 0 if none is likelier."""
+        """Most probable size (standard deviation relative to |K|) of the rubber's smooth deviation; 0 for none."""
         plain, bent = self.linear.evidence, self.linear.evidence.with_compound
         return bent.likeliest if bent and bent.log_evidence > plain.log_evidence else 0.0
 
     def free_columns(self, deviation: float) -> Array | None:
-        """Changes of the residuals due to faulty parts of the tests and the compound, left free in refits of effects.
+        """Changes of the residuals due to faulty tests and a deviating rubber, to be fitted together with effects.
 
         Without these columns an effect would be fitted to the faults.
 
         Args:
-            deviation: standard deviation of the compound's deviation, relative to |K|; 0 for no deviation.
+            deviation: standard deviation of the rubber's smooth deviation from the model, relative to |K|; 0 for no
+                deviation.
 
         Returns:
             Change of the whitened residuals per standard deviation, (c, n); None without faulty parts and deviation.
@@ -237,9 +238,9 @@ class SearchState:
 
     @cached_property
     def parameters(self) -> tuple[dict[str, float], Covariance]:
-        """Posterior means [SI] and covariance of the parameters inside their ranges.
+        """Posterior means [SI] and covariance of the parameters that are not at a bound.
 
-        The covariance includes errors of the rig, all patterns of a deviation of the compound and its fast relaxation.
+        The covariance includes errors of the rig, and a smooth deviation and a fast relaxation of the rubber.
         """
         bare, values = self.bare, self.bare.model.values
         group = compound(bare, MAXIMUM_NODES)
@@ -264,7 +265,7 @@ class SearchState:
 
     @cached_property
     def _likely_cases(self) -> Array:
-        """Indices of the noise cases (sizes of rig errors) that are likely, alone or together with a smooth curve."""
+        """Indices of the noise cases (sizes of the rig's errors) with a high evidence, alone or with a smooth curve."""
         return self.linear.likely_cases(self.columns.curves, _NEAR)
 
     def extended(
@@ -273,13 +274,14 @@ class SearchState:
         """List the hypotheses with the explanations of this search state and at most one further explanation.
 
         Args:
-            evidence: evidence of the linear model for the further explanation; if `last` is None, for this state alone.
+            evidence: evidence for this state with the further explanation, from the linearised model; for this state
+                alone if `last` is None.
             last: further explanation; None for this state alone.
             log_odds: natural log of its prior odds.
 
         Returns:
-            The hypothesis and, if a deviation of the compound from the model's laws is considered, a second one with
-            this deviation.
+            The hypothesis without and, if it is considered, with a smooth deviation of the rubber from the model's
+            laws.
         """
         log_prior, bent = self.log_weight + log_odds, evidence.with_compound
         change, log_posterior = max(self.change, evidence.size), log_prior + evidence.log_evidence

@@ -38,13 +38,14 @@ _SMALL = 0.03
 
 @dataclass(frozen=True, eq=False)
 class Projection:
-    """Residuals with the parameters and the compound's deviation projected out, in each of c noise cases.
+    """Residuals from which the effect of parameters and of the rubber's deviation is removed, for c noise cases.
 
-    The projection is P, see the notes of the module.
+    A noise case is an assumption on the sizes of the rig's errors. The projection matrix P is defined in the notes of
+    the module.
 
     Args:
-        rows: residual, then the derivatives with respect to the k parameters, (1 + k, n).
-        compound: deviation of the compound, with q modes.
+        rows: the residual, then its derivatives with respect to the k parameters, (1 + k, n).
+        compound: smooth deviation of the rubber from the model's laws, with q modes.
         cases: indices of the noise cases, (c,).
         base: natural log of the prior weight of the case times the evidence without a further explanation, (c,).
         misfit: r^T P r of the residuals r, (c,).
@@ -65,10 +66,11 @@ class Projection:
     free: Array
 
     def products(self, groups: GroupSet) -> Iterator[tuple[Batch, Array, Array]]:
-        """Inner products of the blocks U of each batch of groups.
+        """Inner products, in the metric P, of the columns U of each block with the residuals r and with each other.
 
         Yields:
-            The batch; U^T P r with the residuals r, (c, blocks, width); and U^T P U, (c, blocks, width, width).
+            For each batch of blocks of equal width: the batch; U^T P r, (c, blocks, width); and U^T P U, (c, blocks,
+            width, width).
         """
         used, index = np.unique(self.rows.rig.combinations[1][self.cases], return_inverse=True)
         (modes, shrinkage), (root, scale) = self.modes, self.root
@@ -88,8 +90,8 @@ class Projection:
 class LinearModel:
     """Linearised residuals of a fitted model, from which the evidence for each further explanation is computed.
 
-    All log evidences are natural logs of the marginal likelihood, averaged over noise cases and up to a common
-    constant. A noise case is one assumption on the sizes of the rig's errors and of the compound's deviation.
+    A log evidence is the natural log of the marginal likelihood, up to a common constant, averaged over noise cases:
+    assumptions on the sizes of the rig's errors and of the rubber's smooth deviation from the model's laws.
 
     Args:
         residual: residuals in units of the scatter from point to point, (n,).
@@ -114,11 +116,11 @@ class LinearModel:
 
     @cached_property
     def cases(self) -> Array:
-        """Indices of all noise cases; without `compound`, only of those without a deviation."""
+        """Indices of all noise cases; without `compound`, only of those without a deviation of the rubber."""
         return np.flatnonzero((self.rig.deviation == 0.0) | (self.compound is not None))
 
     def project(self, cases: Array) -> Projection:
-        """Project the parameters and the compound's deviation out of the residuals.
+        """Project the parameters and the rubber's deviation out of the residuals.
 
         Args:
             cases: indices of c noise cases, (c,).
@@ -151,7 +153,7 @@ class LinearModel:
 
     @cached_property
     def over_cases(self) -> tuple[Array, Array, Array]:
-        """Fields `base`, `misfit` and `deviation` of `Projection` for all noise cases."""
+        """Log evidence, squared misfit and mean deviation of the rubber (see `Projection`) in all noise cases."""
         projection = self.project(self.cases)
         return projection.base, projection.misfit, projection.deviation
 
@@ -200,7 +202,7 @@ class LinearModel:
 
     @property
     def log_evidence_with_level_errors(self) -> float:
-        """Natural log of the evidence if only rig errors of levels, see `priors.LEVELS`, exceed the stated accuracy."""
+        """Natural log of the evidence if only rig errors of levels exceed the stated accuracy, see `priors.LEVELS`."""
         wide = ~self.rig.is_plain & (self.rig.deviation == 0.0)
         return float(np.logaddexp.reduce(self.over_cases[0][wide[self.cases]]))
 
@@ -243,12 +245,12 @@ class LinearModel:
         return float(np.exp(base - np.logaddexp.reduce(base)) @ chdtrc(freedom, self.over_cases[1]))
 
     def parameters(self, cases: Array, relaxation: Array) -> tuple[Array, Array]:
-        """Posterior of the changes of the k rows of the Jacobian from the fit, averaged over noise cases.
+        """Posterior of the changes of the k parameters from their fitted values, averaged over noise cases.
 
         Args:
             cases: indices of the noise cases.
-            relaxation: change of the n residuals by a relaxation that is faster than the tests, (n,). A compound that
-                deviates may have one, of any size in `priors.SIZES`.
+            relaxation: change of the n residuals by a relaxation of the rubber faster than the tests, (n,). A rubber
+                that deviates from the model may have one, with a size of `priors.SIZES`.
 
         Returns:
             Mean, (k,), and covariance within and between the noise cases, (k, k).
@@ -297,15 +299,15 @@ class LinearModel:
 
 
 def _scale_information(grams: Array, rows: Array, precision: Array) -> tuple[Array, Array]:
-    """Scale the information on k parameters to a diagonal near 1, and make it invertible.
+    """Scale the information matrix of k parameters so that its diagonal is nearly 1, and make it invertible.
 
     Args:
-        grams: inner products of the rows in each noise case, (cases, k, k).
+        grams: information matrix in each noise case, (cases, k, k).
         rows: derivatives of the residuals with respect to the parameters, (k, n).
-        precision: prior precision of each parameter, (k,).
+        precision: prior precision (inverse variance) of each parameter, (k,).
 
     Returns:
-        Scale of each parameter, (k,), and the scaled information, (cases, k, k).
+        Scale of each parameter, (k,), and the scaled information matrices, (cases, k, k).
     """
     scale = np.sqrt(np.maximum(np.einsum("kn,kn->k", rows, rows) + precision, np.finfo(float).tiny))
     return scale, (grams + np.diag(precision)) / np.outer(scale, scale) + _ROUNDING * np.eye(scale.size)

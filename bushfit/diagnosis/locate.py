@@ -76,7 +76,7 @@ class LineMisfit:
 
     @property
     def label(self) -> str:
-        """Text of the line's constant quantity and preload, such as "0.1 mm" or "10 Hz"; else the name of the test."""
+        """Text with the line's constant quantity and its preload, such as "0.1 mm"; else the name of the test."""
         held = f"{self.frequency[0]:.4g} Hz" if self.stepped else self.name
         if self.stepped == "frequency":
             held = shown_amplitude(self.direction, float(self.amplitude[0]))
@@ -110,7 +110,7 @@ def line_misfits(sweep: MeasuredSweep, model: Model) -> Iterator[LineMisfit]:
 
 
 def find_regions(fit: FitResult) -> tuple[MisfitRegion, ...]:
-    """Find the regions of frequency and amplitude where a fitted model and the tests disagree, the worst first."""
+    """Find the regions of frequency and amplitude in which a fitted model and the tests disagree, the worst first."""
     found = [*_sweep_regions(fit), *_loop_regions(fit)]
     worth = [region for region in found if region.excess > _WORTH_A_LINE]
     return tuple(sorted(worth, key=lambda region: -region.excess)[:_MOST_LINES])

@@ -41,12 +41,12 @@ class NextTest:
     Args:
         sentence: instruction to the laboratory.
         hours: time on the rig, including the change of the set-up [h].
-        place: direction or specimen; None for the direction or specimen of the last test.
-        frequencies: frequencies [Hz], or multiples of the highest frequency tested if `beyond`; None for all
-            frequencies tested.
+        place: direction or specimen to test; None for that of the last test.
+        frequencies: frequencies [Hz], or if `beyond` multiples of the highest frequency so far; None for all
+            frequencies tested so far.
         beyond: True if `frequencies` are multiples.
-        amplitudes: multiples of the largest amplitude tested, or if negative of the smallest; None for all amplitudes
-            tested.
+        amplitudes: amplitudes as multiples of the largest amplitude so far, or, if negative, of the smallest; None for
+            all amplitudes tested so far.
         mounted: stiffness of the part mounted in place of the bushing, relative to the bushing; None for the bushing.
     """
 
@@ -197,7 +197,15 @@ def _distances(test: NextTest, models: Sequence[Model], place: Place, frequency:
 
 
 def _points(test: NextTest, data_sets: Sequence[MeasuredTest]) -> tuple[Array, Array, Place]:
-    """Operating points of a test: frequencies [Hz], amplitudes [m or rad, or strain], and direction or specimen."""
+    """Operating points of a candidate test, as all combinations of its frequencies and amplitudes.
+
+    Args:
+        test: the candidate test.
+        data_sets: the tests so far, which set the ranges.
+
+    Returns:
+        Frequency [Hz], (n,); amplitude, zero-to-peak [m or rad, or strain], (n,); and direction or specimen.
+    """
     place = test.place or data_sets[-1].direction
     same_place = [data_set for data_set in data_sets if data_set.direction == place] or list(data_sets)
     amplitudes = np.unique(np.concatenate([data_set.amplitude for data_set in same_place]))

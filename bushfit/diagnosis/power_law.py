@@ -86,12 +86,13 @@ class PowerLaw:
 
     Args:
         measure: unit of A with the highest evidence: stiffness, modulus or share of the model's stiffness.
-        alternatives: other units that the tests cannot distinguish; the intervals average over all by probability.
+        alternatives: other units that fit the tests nearly as well; the intervals average over all units by
+            probability.
         phase_deg: phase phi [deg], with the ends of its interval.
         frequency_power: power p of frequency, with the ends of its interval.
         amplitude_power: power q of amplitude, with the ends of its interval.
         is_likely: True if the evidence of the power law exceeds that of a smooth curve of any form.
-        of_one_place: True if a single direction or specimen was tested, so that the measures cannot be distinguished.
+        of_one_place: True if only one direction or specimen was tested, so that the units cannot be distinguished.
     """
 
     measure: Measure
@@ -113,7 +114,7 @@ class PowerLaw:
     def sentence(self) -> str:
         """Text on the power law, such as "more loss, grows as f^0.8, independent of amplitude: acts like a damper".
 
-        Phase, powers and unit that the tests leave open are not mentioned.
+        A phase, power or unit that the tests do not determine is left out.
         """
         phase, low, high = self.phase_deg
         near = next((text for quarter, text in _QUARTERS.items() if low <= quarter <= high), "")
@@ -148,10 +149,10 @@ class PowerLaw:
 
 @dataclass(frozen=True, eq=False)
 class Term:
-    """Complex stiffness added to a model at p operating points, whose power law of f and X is sought.
+    """Complex stiffness that a model lacks at p operating points, in one of three units, to be fitted by a power law.
 
-    The points belong to all tests except tests of coupons. A value is the added stiffness at the points in the unit
-    `measure`, (p,). A shape is a value for a unit amount.
+    The points are those of all tests except tests of coupons. In the methods, `value` is the added stiffness at the
+    points in the unit `measure`, (p,), and a shape is the value for an amount of 1.
 
     Args:
         fit: the fitted model and the tests.
@@ -193,11 +194,11 @@ class Term:
         return np.concatenate([np.full(test.frequency.size, per_unit(test.direction)) for test, _ in self.tests])
 
     def scaled(self, shapes: Array, model: Model) -> Array:
-        """Scale c shapes of the added stiffness, (c, p), so that each changes the stiffness by at most 100 % of |K|."""
+        """Scale c shapes of the added stiffness, (c, p), so that each changes the model's |K| by at most 100 %."""
         return shapes / np.abs(shapes * self.unit(model) / self.stiffness(model)).max(axis=-1)[:, None]
 
     def residual(self, value: Array, model: Model) -> Array:
-        """Whitened residuals of a model with an added stiffness, `value` (p,) in the unit `measure`.
+        """Whitened residuals of a model to which the stiffness `value`, (p,) in the unit `measure`, is added.
 
         Returns:
             Residuals of all tests and priors, (n,).
@@ -291,7 +292,7 @@ class _Grid:
     Args:
         measure: unit of the added stiffness.
         linear: linearised model without the added stiffness.
-        groups: one group of two columns (in phase and in quadrature) for each pair of powers.
+        groups: residual columns for each pair of powers: a unit of added stiffness in phase, and one in quadrature.
         cases: indices of the noise cases to average over.
         powers: powers of frequency and amplitude, (g, 2).
         step: spacing of the grid along each axis, (2,); 0 along an axis on which the tests do not differ.
@@ -331,7 +332,7 @@ class _Grid:
 def _settled_grid(
     fitted: FitResult, term: Term, rig: RigErrors, cases: Array, model: Model, bounds: Bounds
 ) -> _Grid | None:
-    """Find the powers of frequency and amplitude nearest to a gap, on a grid that narrows about the likeliest pair.
+    """Find the powers of frequency and amplitude that fit a gap best, on a grid that narrows about the likeliest pair.
 
     Args:
         fitted: the fitted model and the tests.
@@ -365,11 +366,13 @@ def _settled_grid(
             return grid
         reach = _REACH * spread + step + np.where(np.isfinite(shift), shift, 0.0)
         ends = np.clip(np.stack((middle - reach, middle + reach)), *limits)
-        model, value = _stepped(Term(fitted, term.measure), model, value, np.exp(middle @ term.points.T)[None], bounds)
+        model, value = _gauss_newton_step(
+            Term(fitted, term.measure), model, value, np.exp(middle @ term.points.T)[None], bounds
+        )
     return None
 
 
-def _stepped(term: Term, model: Model, value: Array, shape: Array, bounds: Bounds) -> tuple[Model, Array]:
+def _gauss_newton_step(term: Term, model: Model, value: Array, shape: Array, bounds: Bounds) -> tuple[Model, Array]:
     """Take one damped Gauss-Newton step of the model's parameters and of the amount of an added stiffness.
 
     Args:

@@ -21,10 +21,10 @@ AT_ONCE = 4_000_000
 
 @dataclass(frozen=True, eq=False)
 class RigRows:
-    """Rows of m residual columns, with their inner products X^T S^-1 Y; S is the covariance of scatter and rig errors.
+    """Changes X of the residuals, with inner products X^T S^-1 Y; S is the covariance by scatter and errors of the rig.
 
     Args:
-        rows: the columns as rows, (m, n).
+        rows: m changes of the n residuals, (m, n).
         rig: errors of the rig.
     """
 
@@ -33,7 +33,12 @@ class RigRows:
 
     @cached_property
     def shared(self) -> Array:
-        """Inner products of the rows with the w errors of each block of the rig, (scatters, blocks, w, m)."""
+        """Inner products of the rows with the errors of the rig, weighted by the scatter only.
+
+        Returns:
+            Products for each size of the scatter, each block of residuals with common errors and each of its w errors,
+            (scatters, blocks, w, m).
+        """
         weights, kernels = self.rig.weights[0], self.rig.kernels[0]
         shared = np.zeros((len(weights), len(kernels), kernels.shape[-1], len(self.rows)))
         for number, block in enumerate(self.rig.blocks):
@@ -42,11 +47,11 @@ class RigRows:
         return shared
 
     def inner(self, other: RigRows, combinations: Array) -> Array:
-        """Inner products with other rows.
+        """Inner products X^T S^-1 Y with the rows Y of another set.
 
         Args:
-            other: m2 other rows.
-            combinations: indices of c combinations of sizes of the rig's errors, (c,).
+            other: the other set, of m2 rows.
+            combinations: indices of c assumed sizes of the rig's errors, see `RigErrors.combinations`, (c,).
 
         Returns:
             Products, (c, m, m2).
@@ -70,10 +75,10 @@ class RigRows:
 
 @dataclass(frozen=True, eq=False)
 class CompoundDeviation:
-    """Deviation of the compound beside the errors of a rig, decomposed once for all fitted models.
+    """Smooth deviation of the rubber from the model's laws, as modes that are independent beside the errors of a rig.
 
     Args:
-        group: q columns of the deviation at unit size.
+        group: q changes of the residuals, each by a deviation of unit size.
         rig: errors of the rig.
     """
 
@@ -82,34 +87,46 @@ class CompoundDeviation:
 
     @cached_property
     def rows(self) -> RigRows:
-        """Columns of the deviation, with their inner products."""
+        """The q changes of the residuals, with their inner products."""
         return RigRows(self.group.whole, self.rig)
 
     @cached_property
     def modes(self) -> tuple[Array, Array]:
-        """Eigenvalues, (combinations, q), and eigenvectors, (combinations, q, q), of D^T S^-1 D for the columns D."""
+        """Eigenvalues, (combinations, q), and eigenvectors, (combinations, q, q), of D^T S^-1 D for the q columns D."""
         values, vectors = np.linalg.eigh(self.rows.inner(self.rows, np.arange(len(self.rig.combinations[0]))))
         return np.maximum(values, 0.0), vectors
 
     def inner(self, rows: RigRows, combinations: Array) -> Array:
-        """Inner products of the q modes with m rows, for c combinations of sizes of the rig's errors, (c, q, m)."""
+        """Inner products of the modes with other rows.
+
+        Args:
+            rows: m changes of the residuals.
+            combinations: indices of c assumed sizes of the rig's errors, (c,).
+
+        Returns:
+            Products, (c, q, m).
+        """
         return self.modes[1][combinations].swapaxes(1, 2) @ self.rows.inner(rows, combinations)
 
     def largest_changes(self, amounts: Array, combinations: Array) -> Array:
-        """Square of the largest relative change of |K| due to deviations.
+        """Square of the largest relative change of |K| by a deviation with given amounts of its modes.
 
         Args:
             amounts: amounts of the q modes, (cases, q).
-            combinations: index of the combination of sizes of the rig's errors in each case, (cases,).
+            combinations: index of the assumed sizes of the rig's errors in each case, (cases,).
+
+        Returns:
+            Squared relative change, (cases,).
         """
         vectors = self.modes[1][combinations]
         return np.square(np.abs(np.einsum("nij,nj->ni", vectors, amounts) @ self.group.unit)).max(axis=-1)
 
 
 class Batch(NamedTuple):
-    """Blocks with the same number of columns and the same change of the stiffness, for array operations.
+    """Blocks of columns with equal width and equal change of the stiffness, so that arrays hold them all.
 
-    A block is a set of columns that act together.
+    A block is a set of columns of residual changes that act together. A group (explanation) is one block, or one block
+    for each column.
 
     Args:
         groups: index of the group of each block, ascending, (blocks,).
@@ -126,7 +143,7 @@ class Batch(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class GroupSet:
-    """Explanations to compare, with the inner products of their columns that are the same for every fitted model.
+    """Explanations to compare, with the inner products of their residual columns, which no fitted model changes.
 
     Args:
         groups: candidate explanations, each a group of residual columns; g columns in all.
@@ -170,10 +187,10 @@ class GroupSet:
 
     @cached_property
     def _products_within(self) -> list[Array]:
-        """Gram matrices of the columns of each block, before rig errors are projected out, one array for each batch.
+        """Inner products of the columns of each block, weighted by the scatter only, one array for each batch.
 
-        Each array is (scatters, blocks, width, width): for each assumed scatter of the points and each block of columns
-        that act together, the inner products of its `width` columns.
+        Each array is (scatters, blocks, width, width): for each assumed scatter of the points and each block of `width`
+        columns.
         """
         by_batch = []
         for batch in self.batches:
@@ -182,7 +199,7 @@ class GroupSet:
         return by_batch
 
     def within(self, combinations: Array) -> list[Array]:
-        """Inner products within the blocks for c combinations of sizes of the rig's errors, computed once for each.
+        """Inner products of the columns of each block for c assumed sizes of the rig's errors; results are kept.
 
         Returns:
             Products for each batch of blocks, (c, blocks, width, width).
@@ -199,10 +216,10 @@ class GroupSet:
         return [np.stack(arrays) for arrays in zip(*(self._within[n] for n in combinations.tolist()), strict=True)]
 
     def with_modes(self, compound: CompoundDeviation, combinations: Array) -> Array:
-        """Inner products of a deviation's q modes with the g columns, computed once for each combination of rig errors.
+        """Inner products of the rubber's deviation with all columns, for c sizes of the rig's errors; results are kept.
 
         Returns:
-            Products, (combinations, q, g).
+            Products of the q modes of the deviation with the g columns of all groups, (c, q, g).
         """
         if not len(compound.group.columns):
             return np.zeros((len(combinations), 0, len(self.rows.rows)))

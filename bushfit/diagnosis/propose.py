@@ -32,7 +32,7 @@ _STEP = 1e-5
 
 @dataclass(frozen=True, eq=False)
 class Proposal(Explanation):
-    """Effect of the library that the model lacks, with its expected decrease of chi-square before any refit.
+    """Effect of the library that the model lacks, with the decrease of chi-square expected before any refit.
 
     A shape parameter is a parameter of an effect other than its amount, such as the frequency of a resonance. The group
     has one column for each set of shape parameters tried; it is None if the effect replaces a branch.
@@ -92,7 +92,7 @@ def proposals(fit: FitResult, excluded: Collection[str], fixed: Sequence[str]) -
 
 
 def scores(columns: Array, residual: Array, basis: Array) -> tuple[Array, Array, Array]:
-    """Decrease of chi-square if each of c changes of the residuals is fitted together with the parameters.
+    """Decrease of chi-square if the amount of a change of the residuals is fitted together with the parameters.
 
     Args:
         columns: changes of the n whitened residuals per unit amount, (c, n).
@@ -120,7 +120,7 @@ def parameter_basis(jacobian: Array) -> Array:
 
 
 def has_used_parameters(effect: Effect, model: Model) -> bool:
-    """True if a model has all parameters of its branches that the law of an effect uses."""
+    """True if a model has all parameters of other branches that the law of an effect uses."""
     return not (isinstance(effect, Branch) and {*effect.uses} - {*model.values})
 
 
@@ -133,7 +133,8 @@ def missing_effects(model: Model, places: Collection[str], excluded: Collection[
         excluded: names of effects not to consider, with their twins.
 
     Returns:
-        Effects; of twins (the same response from bushing and rig) only the effect of the bushing.
+        Effects. Of twins (an effect of the bushing and one of the rig with the same response), only that of the
+        bushing.
     """
     present = (None, *model.effects)
     excluded_names = {name for member in (*model.effects, *excluded) for name in twins_of(member)}

@@ -42,10 +42,10 @@ class DiagnosisSettings:
 
     Args:
         max_effects: maximum number of added effects, adopted ones included; one may be added in any case.
-        tolerance: gap, relative to |K| (or to half a loop's force range), up to which an explanation is neglected.
-        adopt: names of effects to add, and of mistakes to correct, whatever the evidence.
+        tolerance: gap, relative to |K| (for a loop: to half its force range), below which an explanation is neglected.
+        adopt: names of effects to add and of recording mistakes to correct, whatever the evidence.
         without: names of effects (with their twins) and mistakes not to consider.
-        unresolved: effects of the starting model that earlier tests could not distinguish from a twin of the rig.
+        unresolved: effects of the starting model that earlier tests could not distinguish from an effect of the rig.
     """
 
     max_effects: int = 3
@@ -80,7 +80,7 @@ class MisfitRegion:
 
 @dataclass(frozen=True)
 class NamedCause:
-    """Effect or mistake in the record that a diagnosis names, or the first of a set that the tests cannot distinguish.
+    """Effect or recording mistake that a diagnosis names, or the first of a set that the tests cannot distinguish.
 
     Args:
         name: name of the effect or mistake.
@@ -114,7 +114,7 @@ class Odds:
         fits: fitted model of each explanation, with its covariance; None for the reported explanation, and for an
             explanation that was not fitted.
         labels: names of the effects, mistakes and faults of each explanation, joined by " + ".
-        are_alternatives: True if the bands of predictions include `fits`, because the tests cannot decide between the
+        are_alternatives: True if predictions must allow for `fits` too, because the tests cannot decide between the
             explanations or because only a part of the gap is explained.
     """
 
@@ -131,11 +131,11 @@ class Odds:
             result: the result under one explanation.
 
         Returns:
-            The result with, for each other explanation, the squared difference of its parameters times its probability
-            added to the covariance; and with the explanations as alternatives if the tests cannot distinguish them.
+            The result with a larger covariance: for each other explanation, the squared difference of its parameters
+            times its probability is added. If `are_alternatives`, the result also lists the other models.
 
-        Notes: parameters are not comparable, and add nothing, if the other fit has one of them at its bound (without
-        mu, coefficients over mu are meaningless), or if an effect replaces one of the result's.
+        Notes: nothing is added for parameters that are not comparable: those at a bound in the other fit, those divided
+        by such a parameter, and those of a branch that an effect replaces.
         """
         cov, current = result.covariance, result.model.values
         matrix, alternatives = cov.matrix.copy(), list[Alternative]()
@@ -329,7 +329,7 @@ def format_odds(document: Mapping[str, Any]) -> list[str]:
 
 
 def level_of(name: str) -> str:
-    """Level of an effect or mistake: material, component, instrument or record; "unresolved" if it has twins."""
+    """Level of an effect (material, component, instrument) or mistake (record); "unresolved" for an effect with twins."""
     candidate = get_candidate(name)
     return "unresolved" if candidate.twins or name == UNNAMED else str(candidate.level)
 

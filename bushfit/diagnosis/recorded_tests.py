@@ -25,7 +25,7 @@ _RECORDED = ("measured", "amplitude", "frequency")
 
 @dataclass(frozen=True, eq=False)
 class RecordedTests:
-    """Tests as recorded, or with one mistake in the record corrected, with the starting model fitted to them.
+    """Tests as recorded or with one recording mistake corrected, with the starting model fitted to them.
 
     Args:
         base: fit of the starting model; its residuals are whitened by scatter and by errors that points share.
@@ -33,7 +33,8 @@ class RecordedTests:
             points share are not part of this unit.
         rig: stated accuracy class of the rig (gain and phase errors).
         errors: errors of the rig that points share.
-        deviation: changes of the residuals if the rubber deviates smoothly from the model's laws; None without tests.
+        deviation: changes of the residuals if the rubber deviates smoothly from the model's laws; None if the tests
+            cannot show any.
         log_prior: natural log of the prior probability that this record is right and nothing is missing.
         claim: mistake that is corrected; None for the tests as recorded.
         change: relative change of the recorded quantities due to the correction; 0 for the tests as recorded.
@@ -66,34 +67,34 @@ class RecordedTests:
 
     @cached_property
     def columns(self) -> ExplanationColumns:
-        """Explanations of a gap that do not depend on effects, beside the errors of the rig."""
+        """Residual columns of the explanations of a gap other than effects, beside the errors of the rig."""
         return ExplanationColumns(self, self.errors)
 
     @cached_property
     def explanations(self) -> list[Explanation]:
-        """Explanations of a gap that do not depend on effects: faulty parts of the tests, and smooth curves."""
+        """Explanations of a gap other than effects: faulty parts of the tests, and smooth curves."""
         return [*find_faulty_parts(self.bare), *unnamed_curves(self.bare)]
 
     @cached_property
     def compound_in_fits(self) -> Group | None:
-        """Changes of the residuals, whitened as in a fit, if the rubber deviates smoothly from the model's laws.
+        """Changes of the residuals by a smooth deviation of the rubber, in units of a fit's noise; None without any.
 
-        A refit with an effect also estimates the amounts of these changes, without a prior; None without tests.
+        `deviation` has the same changes in units of the point-to-point scatter. A refit with an effect also estimates
+        their amounts, without a prior.
         """
         return compound(self.base)
 
     @cached_property
     def faulty_parts_in_fits(self) -> dict[str, FaultyPart]:
-        """Faulty parts by name; their changes of the residuals are whitened as in a fit, not in units of scatter."""
+        """Faulty parts by name, with changes of the residuals in units of the noise of a fit, not of the scatter."""
         return {part.name: part for part in find_faulty_parts(self.base)}
 
 
 @dataclass(frozen=True, eq=False)
 class ExplanationColumns:
-    """Changes of the residuals per unit of each explanation other than an effect, one column each.
+    """Residual columns of the explanations of a gap other than effects, and of the rubber's smooth deviation.
 
-    Such explanations are faulty parts of the tests and smooth curves. The columns of the compound's deviation, which is
-    part of every hypothesis, are included.
+    The explanations are faulty parts of the tests and smooth curves. The deviation is a part of every hypothesis.
 
     Args:
         tests: tests whose gap is explained.
@@ -105,7 +106,7 @@ class ExplanationColumns:
 
     @cached_property
     def compound(self) -> CompoundDeviation | None:
-        """Deviation of the compound beside the errors of the rig; None without tests."""
+        """Smooth deviation of the rubber beside the errors of the rig; None if the tests cannot show any."""
         return CompoundDeviation(self.tests.deviation, self.errors) if self.tests.deviation else None
 
     @cached_property
@@ -115,7 +116,7 @@ class ExplanationColumns:
 
     @cached_property
     def curves(self) -> GroupSet | None:
-        """Columns of the smooth curves; None without tests."""
+        """Columns of the smooth curves; None without curves."""
         curves = [e.group for e in self.tests.explanations if e.group and e.kind == "unnamed"]
         return GroupSet(curves, self.errors) if curves else None
 
@@ -135,7 +136,7 @@ def modulus_deviation(fit: FitResult) -> float:
 
 
 def record_change(base: FitResult, corrected: FitResult) -> float:
-    """Largest relative change of a recorded stiffness (complex), amplitude or frequency in a correction of the record.
+    """Largest relative change of a complex stiffness, amplitude or frequency by the correction of a recording mistake.
 
     The value is 1 if the dimensions of the bushing or the direction of a test are corrected.
 

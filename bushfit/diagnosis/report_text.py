@@ -53,13 +53,13 @@ _LEVELS_ADVICE = "measure the levels again in another session, or state the clas
 
 @dataclass(frozen=True, eq=False)
 class Closing:
-    """Model that closes a gap as far as possible.
+    """Fitted model that closes the gap between model and tests as far as possible.
 
     Args:
         certain: fit of the starting model with the effects that are certain.
         known: covariance of the amounts of effects that the fit kept fixed; None without any.
-        gap: description of the gap that the correction closes; None without a correction.
-        holdout: residuals of held-out tests, if they were computed for the decision; else None.
+        gap: smooth correction of the model for the rest of the gap, with its description; None without a correction.
+        holdout: residuals of held-out tests, if they were needed to decide on a correction; else None.
     """
 
     certain: FitResult
@@ -104,21 +104,25 @@ class DiagnosisWriter:
             return self._build(Closing(self._with_free_gains(self.search.base)), _NOTHING)
         mistakes = {composition.best.claim and composition.best.claim.key for composition in self.finding.reported}
         if verdict in ("named", "partly", "ambiguous") and first.best.claim and len(mistakes) == 1:
-            return self._mistaken_record(first)
+            return self._record_diagnosis(first)
         closing = self._close_gap(first)
         if verdict in ("named", "partly"):
-            diagnosis = self._named(first, closing)
+            diagnosis = self._named_diagnosis(first, closing)
             revised = self._revised_finding(diagnosis, closing.holdout)
             return replace(self, finding=revised).diagnosis() if revised else diagnosis
         if (holdout := closing.holdout) and (holdout.after or np.inf) >= (holdout.before or 0.0):
             return replace(self, finding=replace(self.finding, names=())).diagnosis()
-        return self._undecided(first, closing) if verdict == "ambiguous" else self._nameless(first, closing)
+        return (
+            self._undecided_diagnosis(first, closing)
+            if verdict == "ambiguous"
+            else self._nameless_diagnosis(first, closing)
+        )
 
     def _close_gap(self, first: Composition) -> Closing:
-        """Fit the effects that are certain, and describe what they leave by a smooth correction.
+        """Fit the effects that are certain, and correct the model for the rest of the gap by a smooth function.
 
-        No correction is made if one explanation closes the gap, or if tests or records may be wrong. Without it, the
-        amounts of effects may be distorted, so held-out tests are predicted with and without them.
+        The model is not corrected if the effects close the gap, or if tests may be faulty or wrongly recorded. The
+        amounts of effects may then be distorted, so held-out tests are predicted with and without them.
         """
         verdict, search, reported = self.finding.verdict, self.search, self.finding.reported
         may_be_wrong = {
@@ -158,7 +162,7 @@ class DiagnosisWriter:
         return fit_model(model.with_values(added), base.data_sets, [*base.fixed, *added], bounds), known
 
     def _with_free_gains(self, fit: FitResult) -> FitResult:
-        """Refit a model without the assumed gain error of loops; unchanged if the campaign states a gain error."""
+        """Refit a model without the gain error of loops that bushfit assumes if the campaign states none."""
         loops = split_by_kind(fit.data_sets)[0]
         gain_is_stated = self.search.data.campaign.rig.stiffness_errors[0] is not None
         if gain_is_stated or not any(loop.gain_weighs for loop in loops):
@@ -168,7 +172,7 @@ class DiagnosisWriter:
             self._refitted[fit] = fit_model(fit.model, data_sets, fit.fixed, self.search.data.bounds)
         return self._refitted[fit]
 
-    def _named(self, first: Composition, closing: Closing) -> Diagnosis:
+    def _named_diagnosis(self, first: Composition, closing: Closing) -> Diagnosis:
         """Diagnosis in which named effects explain the gap, or part of it with a description of the rest."""
         names, base, fit, gap = (
             self.finding.names,
@@ -210,8 +214,8 @@ class DiagnosisWriter:
         kept, leads = tuple(name for name in names if name not in absent), (*absent, *finding.leads)
         return replace(finding, verdict="partly" if kept else "described", names=kept, leads=leads)
 
-    def _mistaken_record(self, first: Composition) -> Diagnosis:
-        """Diagnosis in which a mistake in the record explains the gap; the model to use is unchanged."""
+    def _record_diagnosis(self, first: Composition) -> Diagnosis:
+        """Diagnosis in which a recording mistake explains the gap; the model to use remains the starting model."""
         best, claim, base = first.best, first.best.claim, self._with_free_gains(self.search.base)
         assert claim is not None
         command, corrections = f"bushfit diagnose CAMPAIGN {claim.options}", "; ".join(claim.corrections)
@@ -226,7 +230,7 @@ class DiagnosisWriter:
         result = replace(diagnosis.result, warnings=(*diagnosis.result.warnings, warning))
         return replace(diagnosis, after=after, remainder=find_regions(after), result=result)
 
-    def _undecided(self, first: Composition, closing: Closing) -> Diagnosis:
+    def _undecided_diagnosis(self, first: Composition, closing: Closing) -> Diagnosis:
         """Diagnosis of a gap with several possible causes: what closes it, the causes, and the test that decides."""
         reported, gap = self.finding.reported, closing.gap
         candidates = self._candidates
@@ -243,7 +247,7 @@ class DiagnosisWriter:
         advice = self._deciding_advice(leader)
         return self._build(closing, "; ".join(sentences), entries, places=faulty, next_test=advice)
 
-    def _nameless(self, first: Composition, closing: Closing) -> Diagnosis:
+    def _nameless_diagnosis(self, first: Composition, closing: Closing) -> Diagnosis:
         """Diagnosis of a gap that no known effect explains: a smooth correction, or the tests to measure again."""
         gap, candidates = closing.gap, self._candidates
         advice = self._deciding_advice(candidates[0] if candidates else first)
@@ -294,7 +298,7 @@ class DiagnosisWriter:
         return advice or (get_effect(leader.names[0]).confirmed_by if leader.names else "")
 
     def _record_entries(self, composition: Composition, alternatives: tuple[str, ...] = ()) -> list[NamedCause]:
-        """List the reported entries for the mistake in the record of an explanation, one for each affected test.
+        """List the report's entries on the recording mistake of an explanation, one for each affected test.
 
         Args:
             composition: the explanation.

@@ -26,15 +26,15 @@ _KNOWN = 30
 
 @dataclass(frozen=True)
 class NoiseCase:
-    """One assumption on the sizes of the rig's errors and of the compound's deviation, over which evidence is averaged.
+    """One assumption on the sizes of the rig's errors and of the rubber's smooth deviation from the model's laws.
 
     Args:
-        scatter: standard deviation of a sweep's point, relative to the estimated point-to-point noise.
+        scatter: standard deviation from point to point of a sweep, relative to its estimate.
         errors: standard deviations of the errors of a run, of a level (all points at one constant amplitude or
             frequency), of drift along a run, and of a loop, relative to those of the rig's accuracy class.
         log_weight: natural log of the prior probability of the case.
         wide: True if the case assumes errors of levels larger than the accuracy class allows.
-        compound: standard deviation of the compound's deviation from the model's laws, relative to |K|.
+        compound: standard deviation of the rubber's deviation, relative to |K|.
     """
 
     scatter: float
@@ -83,21 +83,21 @@ class RigErrors:
 
     @cached_property
     def deviation(self) -> Array:
-        """Standard deviation of the compound's deviation from the model in each case, relative to |K|, (cases,)."""
+        """Standard deviation of the rubber's smooth deviation from the model in each case, relative to |K|, (cases,)."""
         return np.array([case.compound for case in self.cases])
 
     @cached_property
     def is_plain(self) -> Array:
-        """Mask of the cases with rig errors within the stated accuracy and without a deviation of the compound."""
+        """Mask of the cases with rig errors within the stated accuracy and without a deviation of the rubber, (cases,)."""
         return np.array([not case.wide and case.compound == 0.0 for case in self.cases])
 
     @cached_property
     def combinations(self) -> tuple[Array, Array]:
-        """Distinct combinations of sizes of the rig's errors; noise cases that differ only in the compound share one.
+        """Distinct sizes of scatter and rig errors; cases that differ only in the rubber's deviation share one.
 
         Returns:
-            Scatter and sizes of the errors of runs, levels, drift and loops, (combinations, 1 + kinds); and the index
-            of the combination of each case, (cases,).
+            Scatter, then the sizes of the errors of runs, levels, drift and loops, (combinations, 5); and the index of
+            the combination of each case, (cases,).
         """
         sizes = np.array([(case.scatter, *case.errors) for case in self.cases])
         distinct, index = np.unique(sizes, axis=0, return_inverse=True)
@@ -105,10 +105,10 @@ class RigErrors:
 
     @cached_property
     def weights(self) -> tuple[Array, Array]:
-        """Reciprocal variances of the residuals without the errors that points share.
+        """Reciprocal variances of the residuals due to scatter alone, without the errors that points have in common.
 
         Returns:
-            Values for each size of the scatter, (scatters, n); and the index of this size for each combination,
+            Values for each distinct scatter, (scatters, n); and the index of the scatter of each combination,
             (combinations,).
         """
         scatters, index = np.unique(self.combinations[0][:, 0], return_inverse=True)
@@ -120,15 +120,15 @@ class RigErrors:
 
     @cached_property
     def kernels(self) -> tuple[Array, Array]:
-        """Inverse covariance of the residuals for every combination of sizes, in parts.
+        """Parts of the inverse covariance of the residuals (scatter and rig errors), for each combination of sizes.
 
         Returns:
             K = D (1 + D W N^-1 W^T D)^-1 D with scatter N and rig errors W of sizes D, (blocks, combinations, w, w);
             and the natural log of the determinant of the covariance, (combinations,).
 
         Notes:
-            The covariance is N + W^T D^2 W, so whitened inner products of rows R are R N^-1 R^T less
-            (W N^-1 R^T)^T K (W N^-1 R^T).
+            The covariance is N + W^T D^2 W, so whitened inner products of rows R are R N^-1 R^T less (W N^-1 R^T)^T K
+            (W N^-1 R^T).
         """
         sizes, _ = self.combinations
         weights, scatter = self.weights
@@ -147,7 +147,7 @@ class RigErrors:
 
 
 def in_scatter_units(fit: FitResult) -> FitResult:
-    """Express the residuals of a fit in units of the scatter from point to point, to compare hypotheses.
+    """Express the residuals of a fit in units of the scatter from point to point alone, to compare hypotheses.
 
     Residuals of sweeps are differences of ln K (gain and phase), because a difference relative to the measurement would
     make noise appear smaller where the model is wrong.
@@ -205,7 +205,7 @@ def noise_cases(fit: FitResult) -> list[NoiseCase]:
 
 
 def error_blocks(fit: FitResult, rig: RigSettings) -> Iterator[Block]:
-    """List the sets of residual rows that share errors: the gain or phase of a level of a sweep, or repeated loops.
+    """Divide the residuals into sets with errors in common: gains or phases of a sweep's level, or repeated loops.
 
     Args:
         fit: the fitted model and the tests.

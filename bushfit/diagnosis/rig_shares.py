@@ -27,11 +27,11 @@ _ITERATIONS = 3
 
 
 def with_rig_alternatives(result: Result, hypotheses: Sequence[Hypothesis], base: FitResult) -> Result:
-    """Add the models in which effects of the rig are a part of what the smooth correction of a result contains.
+    """Add alternative models in which effects of the rig cause a part of a result's smooth correction.
 
-    A correction closes the gap between model and tests, whatever its cause. Effects of the rubber and the component
-    stay in the car and are predicted well by the correction; effects of the rig do not. So hypotheses are grouped by
-    their effects of the rig, and each group gives one model with the measured stiffness of the result.
+    A correction closes the gap between model and tests, whatever its cause. In the car, effects of the rubber and the
+    component remain, and effects of the rig do not. So hypotheses are grouped by their effects of the rig, and each
+    group gives one model that has these effects and the same stiffness in the tests as the result.
 
     Args:
         result: result; unchanged if its model has no smooth correction.
@@ -39,8 +39,8 @@ def with_rig_alternatives(result: Result, hypotheses: Sequence[Hypothesis], base
         base: starting model, fitted to the tests.
 
     Returns:
-        The result with these alternatives and their probabilities. The rest to 1 is the probability that the rig has
-        the effects of the result's model and no others.
+        The result with these alternatives and their probabilities. The remaining probability is that of the result's
+        own effects of the rig.
     """
     if not result.model.unnamed:
         return result
@@ -71,7 +71,7 @@ def with_rig_alternatives(result: Result, hypotheses: Sequence[Hypothesis], base
 
 
 def _of_rig(names: Iterable[str]) -> frozenset[str]:
-    """Select the effects of the rig, and those with a twin in the rig."""
+    """Select the names of effects of the rig, and of effects with a twin in the rig."""
     return frozenset(name for name in names if get_effect(name).twins or get_effect(name).level is Level.INSTRUMENT)
 
 

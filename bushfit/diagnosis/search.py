@@ -139,15 +139,15 @@ class Search:
             if not beam:
                 break
         self._refit_linear()
-        return self._ordered()
+        return self._ordered_hypotheses()
 
-    def _ordered(self) -> list[Hypothesis]:
+    def _ordered_hypotheses(self) -> list[Hypothesis]:
         """Hypotheses about the gap that the search has recorded so far, the most probable first."""
         return sorted(self._known.values(), key=lambda hypothesis: -hypothesis.log_posterior)
 
     def _is_sure(self) -> bool:
         """True if the search can stop: one explanation, or none missing, is nearly certain and fits the tests."""
-        finding = decide_verdict(self._ordered(), self.settings.tolerance)
+        finding = decide_verdict(self._ordered_hypotheses(), self.settings.tolerance)
         if finding.verdict == "consistent":
             return finding.nothing >= NAMED and self.root.linear.p_value() >= DOES_NOT_FIT
         return finding.verdict == "named" and finding.reported[0].best.refitted
@@ -155,7 +155,7 @@ class Search:
     def _refit_linear(self) -> None:
         """Refit the most probable hypotheses whose evidence still comes from the linear model alone."""
         for _ in range(_SETTLED):
-            ordered = self._ordered()
+            ordered = self._ordered_hypotheses()
             share = np.exp([hypothesis.log_posterior - ordered[0].log_posterior for hypothesis in ordered])
             ahead = (np.cumsum(share) - share) / share.sum()
             candidates = zip(ordered, ahead.tolist(), strict=True)
@@ -166,12 +166,13 @@ class Search:
                 del self._known[linear.key]  # no response with it, or far behind
 
     def _log_odds(self, kind: str, name: str, depth: int) -> float:
-        """Natural log of the prior odds of one more explanation; if it is not listed, the lowest odds of its kind.
+        """Natural log of the prior odds of one more explanation; the lowest odds of its kind if it has none of its own.
 
         Args:
             kind: kind of the explanation.
             name: name of the explanation.
-            depth: number of explanations in the set that it is added to; their order is irrelevant.
+            depth: number of explanations in the set to which it is added. Their order is irrelevant, so the odds are
+                divided by depth + 1.
         """
         if (kind, name) not in self._log_priors:
             self._log_priors[kind, name] = min(odds for (other, _), odds in self._log_priors.items() if other == kind)
@@ -184,7 +185,7 @@ class Search:
         return state
 
     def _note(self, hypotheses: Sequence[Hypothesis]) -> None:
-        """Record hypotheses, alone and with a disturbance at each frequency where several outliers were left out.
+        """Record hypotheses, each without and with a disturbance at each frequency where outliers were left out.
 
         Of two fits of the same set of explanations, a refit replaces a linear fit; otherwise the more probable fit
         stays.
@@ -205,8 +206,8 @@ class Search:
     def _promising(self, step: _Step, depth: int) -> list[Proposal]:
         """Select the effects to refit as additions to a state of the search.
 
-        These have the highest evidence in the linear model, or the largest expected decrease of chi-square, a better
-        criterion for large gaps.
+        The effects with the highest evidence in the linearised model, and those with the largest expected decrease of
+        chi-square, which is the better criterion for a large gap.
 
         Args:
             step: state that the effects are added to, with the evidence for them.
@@ -226,8 +227,8 @@ class Search:
     def _with_effects(self, state: SearchState, effects: Sequence[Proposal], depth: int) -> list[SearchState]:
         """Extend a state of the search by each of several effects, refitted with all parameters.
 
-        Each effect is refitted with the compound's likeliest deviation left free and without a deviation, because each
-        hypothesis is weighed around its own fit; the search goes on from the more probable fit.
+        Each effect is fitted twice: without and with a smooth deviation of the rubber of the likeliest size. The search
+        continues from the more probable fit.
 
         Args:
             state: fitted model with some explanations.
@@ -285,21 +286,22 @@ class Search:
     def _refits(
         self, state: SearchState, model: Model, start: Mapping[str, float], deviation: float = 0.0
     ) -> Collection[FitResult]:
-        """Fit one model to the tests of a state, with its faulty parts left free.
+        """Fit one model to the tests of a state, together with the errors of its faulty parts.
 
         Args:
             state: state with the tests and faulty parts.
             model: model at its starting values.
             start: further starting values, by parameter.
-            deviation: standard deviation of the compound's deviation that is left free, relative to |K|.
+            deviation: standard deviation of a smooth deviation of the rubber that is fitted as well, relative to |K|; 0
+                for none.
 
         Returns:
-            The fit; nothing without a response.
+            The fit, as the only element; empty if the model has no finite response.
         """
         return self._fit_rivals({"": model}, state.fit.data_sets, start, columns=state.free_columns(deviation)).values()
 
     def _without_earlier(self, state: SearchState) -> Iterator[SearchState]:
-        """Yield for each earlier effect, which the last may make unnecessary, the refitted state without it."""
+        """Yield refitted states without one of the earlier effects, which the last effect may make unnecessary."""
         earlier = () if state.faulty_parts else state.effects[:-1]
         shorter = {name: state.fit.model.without(name) for name in earlier}
         for name, model in shorter.items():
@@ -309,7 +311,7 @@ class Search:
                 yield self._visit(self._with_fit(state, [e for e in state.effects if e != name], fit))
 
     def _with_fit(self, state: SearchState, effects: Sequence[str], fit: FitResult) -> SearchState:
-        """Build the state of the search with these effects from a fit of all of them.
+        """Build a state of the search from a fit of several effects.
 
         Args:
             state: state with the tests.
@@ -322,7 +324,7 @@ class Search:
         return fitted
 
     def _with_common_start(self, states: list[SearchState]) -> list[SearchState]:
-        """Refit the rivals of the most probable state from its values, so that all are compared at one minimum.
+        """Refit the states of a round, starting from the most probable one, so that all are compared near one minimum.
 
         A rubber that deviates from the model's laws has several fits of almost equal misfit. An effect must not be
         preferred only because its fit happened to find the best of these.
@@ -344,7 +346,7 @@ class Search:
         return states
 
     def _corrected_records(self) -> Iterator[SearchState]:
-        """Generate the states with one mistake in the record corrected, the most promising mistake first."""
+        """Generate states in which one recording mistake is corrected, the most promising first."""
         possible = claims(self.data, self.settings.without)
         for claim in track("mistakes put right", list(ClaimScreening(self.data).best(possible, _CLAIMS))):
             with suppress(FitError, ModelError):  # corrected tests that nothing can be fitted to

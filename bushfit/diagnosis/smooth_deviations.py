@@ -47,7 +47,7 @@ _STRAIN_ERROR, _STRAIN_STEP = 5.0, 1e-3
 
 
 def compound(fit: FitResult, count: int = _COMPOUND_PATTERNS) -> Group | None:
-    """Changes of the residuals if the modulus of the compound deviates smoothly from the model's laws.
+    """Changes of the residuals if the modulus of the rubber compound deviates smoothly from the model's laws.
 
     The relative deviation is a random function of frequency and strain, the same in all directions and specimens.
 
@@ -56,8 +56,8 @@ def compound(fit: FitResult, count: int = _COMPOUND_PATTERNS) -> Group | None:
         count: maximum number of patterns.
 
     Returns:
-        Group of independent patterns of the deviation, of unit variance at each operating point, and of deviations of
-        the shape of each loop; None without tests.
+        Group with one column for each independent pattern of the deviation (together of unit variance at each operating
+        point) and for each deviation of a loop's shape; None if the tests show no deviation.
     """
     if not fit.data_sets:
         return None
@@ -72,7 +72,7 @@ def compound(fit: FitResult, count: int = _COMPOUND_PATTERNS) -> Group | None:
 
 
 def _strain_changes(fit: FitResult) -> tuple[Array, Array]:
-    """Changes due to an error of the effective strain in each direction or specimen, in the form of `_smooth_changes`.
+    """Changes of residuals and stiffness due to an error of the effective strain in each direction or specimen.
 
     Returns:
         Changes of the n whitened residuals, (d, n), and of the stiffness at all operating points, (d, points), due to
@@ -96,10 +96,11 @@ def _strain_changes(fit: FitResult) -> tuple[Array, Array]:
 
 
 def fast_relaxation(fit: FitResult) -> Array:
-    """Changes of the n whitened residuals due to a relaxation of the compound that is faster than the tests.
+    """Changes of the whitened residuals due to a relaxation of the rubber compound that is faster than the tests.
 
-    Far below its own frequency, a relaxation is a loss modulus that grows as the frequency, like the phase of a delay.
-    At the highest frequency, its loss modulus is here the median modulus |K|/(stiffness per modulus) of the tests.
+    Far below its own frequency, a relaxation is a loss modulus proportional to frequency, as the phase of a delay is.
+    The changes are those for a loss modulus that equals the median modulus |K|/(stiffness per modulus) of the tests at
+    their highest frequency.
 
     Returns:
         Changes, (n,).
@@ -128,15 +129,15 @@ def _compound_correlation(points: Array, nodes: Array) -> Array:
 
 
 def compound_shapes(loop: MeasuredLoop) -> Array:
-    """Changes of the shape of a loop if the stiffness of the compound deviates from the model's laws by 100 %.
+    """Changes of a loop's shape (overtones of its force) if the rubber's stiffness deviates from the model by 100 %.
 
     Returns:
         Changes of the loop's n whitened residuals for c independent deviations, one standard deviation each, (c, n).
 
     Notes:
-        An isotropic compound is symmetric, so a steady cycle has odd overtones only. The h-th falls as 1/h^2, because
-        the force is continuous with kinks where the motion turns back. The first cycle from rest may deviate in
-        addition by as much as a third overtone without this decrease.
+        An isotropic rubber is symmetric, so a steady cycle has odd overtones only. Overtone h decreases as 1/h^2,
+        because the force is continuous with kinks where the motion turns back. The first cycle from rest may also
+        deviate, by as much as a third overtone without this decrease.
     """
     if loop.fundamental_only:
         return np.empty((0, loop.size))

@@ -29,13 +29,13 @@ LEVELS = "errors of levels beyond the class of the rig"
 
 @dataclass(frozen=True, eq=False)
 class Composition:
-    """Explanation of a gap by a set of effects, faults and mistakes (its parts), merged from all hypotheses with them.
+    """Explanation of a gap by a set of effects, faults and recording mistakes, merged from all hypotheses with it.
 
     Args:
         probability: probability of these parts, given that something is missing in the model.
         best: most probable hypothesis with these parts.
-        names: effects in the set. If the set has a deviation of the compound, effects of the rubber are not listed,
-            because the deviation includes them.
+        names: effects in the set. If the set includes a smooth deviation of the rubber, effects of the rubber are not
+            listed, because the deviation includes them.
         unnamed: True if an unnamed smooth curve, or a deviation of the compound, is part of the explanation.
     """
 
@@ -73,9 +73,9 @@ class Composition:
 
     @property
     def may_mislead(self) -> bool:
-        """True if the explanation has a fault (of an amplitude level, repeat or frequency) that may bias its effects.
+        """True if the explanation contains a fault (of a level, repeat or frequency) that may bias its effects.
 
-        A faulty loop is a separate test, and points that were left out have no weight, so they distort no effect.
+        A faulty loop, which is a separate test, and points that were left out of the fit do not bias effects.
         """
         faults = [part for part in self.faulty_parts if not isinstance(part, OutlierCluster)]
         return bool(self.faulty_parts) and (not self.names or any(part.family != "loop" for part in faults))
@@ -106,9 +106,9 @@ def decide_verdict(hypotheses: Sequence[Hypothesis], tolerance: float, *, gap_st
     Args:
         hypotheses: all hypotheses that were compared, the most probable first.
         tolerance: relative change of |K| below which an explanation is neglected.
-        gap_stays: True if held-out tests show a gap that remains with the most probable explanation. The compound then
-            deviates from the model's laws in a way that no effect describes, and only hypotheses with a deviation are
-            compared.
+        gap_stays: True if held-out tests show a gap that remains with the most probable explanation. The rubber then
+            deviates from the model's laws in a way that no effect describes, and only hypotheses with such a deviation
+            are compared.
 
     Returns:
         Verdict, probability that nothing is missing, and the explanations behind the verdict.
@@ -144,7 +144,7 @@ def decide_verdict(hypotheses: Sequence[Hypothesis], tolerance: float, *, gap_st
 
 
 def _verdict_on_parts(likely: Sequence[Composition], nothing: float, leads: Sequence[str]) -> Finding:
-    """Decide the verdict if the parts of the most probable explanation are nearly certain.
+    """Decide the verdict if all parts of the most probable explanation are nearly certain.
 
     Args:
         likely: probable explanations, the first with the parts that are certain.

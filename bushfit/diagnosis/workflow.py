@@ -103,7 +103,7 @@ def diagnose(
 def _initial_fit(
     data: PreparedCampaign, model: Model | None, settings: DiagnosisSettings, fixed: Sequence[str]
 ) -> tuple[FitResult, dict[str, float], tuple[Outlier, ...]]:
-    """Fit the starting model with the adopted effects; gain errors of loops have the stated or an assumed class.
+    """Fit the starting model with the adopted effects; gain errors of loops have the stated or an assumed size.
 
     Args:
         data: campaign with prepared tests.
