@@ -65,7 +65,7 @@ class FaultyPart(Explanation):
 
     @property
     def columns(self) -> Array:
-        """Changes of all n whitened residuals per unit of each of c errors: gain, phase [rad] and their slopes, (c, n)."""
+        """Changes of all n whitened residuals per unit of c errors (gain, phase [rad] and their slopes), (c, n)."""
         assert self.group is not None
         return self.group.whole
 

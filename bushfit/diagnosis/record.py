@@ -329,7 +329,7 @@ def format_odds(document: Mapping[str, Any]) -> list[str]:
 
 
 def level_of(name: str) -> str:
-    """Level of an effect (material, component, instrument) or mistake (record); "unresolved" for an effect with twins."""
+    """Level of an effect (material, component, instrument) or mistake (record); "unresolved" if it has a twin."""
     candidate = get_candidate(name)
     return "unresolved" if candidate.twins or name == UNNAMED else str(candidate.level)
 

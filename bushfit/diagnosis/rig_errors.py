@@ -83,12 +83,12 @@ class RigErrors:
 
     @cached_property
     def deviation(self) -> Array:
-        """Standard deviation of the rubber's smooth deviation from the model in each case, relative to |K|, (cases,)."""
+        """Standard deviation of the rubber's smooth deviation in each case, relative to |K|, (cases,)."""
         return np.array([case.compound for case in self.cases])
 
     @cached_property
     def is_plain(self) -> Array:
-        """Mask of the cases with rig errors within the stated accuracy and without a deviation of the rubber, (cases,)."""
+        """Mask of the cases with rig errors within the stated accuracy and no deviation of the rubber, (cases,)."""
         return np.array([not case.wide and case.compound == 0.0 for case in self.cases])
 
     @cached_property
