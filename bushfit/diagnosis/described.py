@@ -137,10 +137,10 @@ def _hold_out_inside(before: FitResult, closest: FitResult, correction: Unnamed)
     columns = process_columns(closest, correction)
     amounts = np.eye(len(columns), closest.residual.size + len(columns), closest.residual.size)  # rows of their prior
     amounts[:, : columns.shape[1]] = columns
-    slopes = np.pad(closest.jacobian[closest.moving], ((0, 0), (0, len(columns))))
+    slopes = np.pad(closest.jacobian[closest.inner_indices], ((0, 0), (0, len(columns))))
     with_process = LeaveOut.from_fit(np.concatenate((slopes, amounts)), np.pad(closest.residual, (0, len(columns))))
-    without_process = LeaveOut.from_fit(before.jacobian[before.moving], before.residual)
-    models = (before, without_process, len(before.moving)), (closest, with_process, len(slopes))
+    without_process = LeaveOut.from_fit(before.jacobian[before.inner_indices], before.residual)
+    models = (before, without_process, len(before.inner_indices)), (closest, with_process, len(slopes))
     residuals = dict[str, Array]()
     for name, by_sweep in chosen.items():
         pairs = []

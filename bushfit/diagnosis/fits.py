@@ -181,8 +181,8 @@ def result_of(
 
 def misfit_covariance(fit: FitResult) -> Covariance:
     """Covariance of the fitted parameters that are not at a bound, times the reduced chi-square if it exceeds 1."""
-    free = fit.jacobian[fit.moving]
+    free = fit.jacobian[fit.inner_indices]
     matrix = np.linalg.pinv(free @ free.T, rcond=1e-12, hermitian=True)
     matrix *= max(fit.chi_square / max(fit.residual.size - len(matrix), 1), 1.0)  # what the fit misses
-    slopes = fit.coordinates.slopes(fit.model.values)[fit.moving]
-    return Covariance(tuple(fit.names[i] for i in fit.moving), matrix * np.outer(slopes, slopes))
+    slopes = fit.coordinates.slopes(fit.model.values)[fit.inner_indices]
+    return Covariance(tuple(fit.names[i] for i in fit.inner_indices), matrix * np.outer(slopes, slopes))

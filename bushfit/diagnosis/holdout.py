@@ -205,7 +205,7 @@ class Predicted(NamedTuple):
 
 def _leave_out(fit: FitResult) -> LeaveOut:
     """Linearise a fit so that residuals without some rows can be predicted; parameters at a bound are fixed."""
-    return LeaveOut.from_fit(fit.jacobian[fit.moving], fit.residual)
+    return LeaveOut.from_fit(fit.jacobian[fit.inner_indices], fit.residual)
 
 
 def _predict(fit: FitResult, leave_out: LeaveOut, part: HoldOutPart, bounds: Bounds) -> tuple[Array, Array] | Skipped:
@@ -225,7 +225,7 @@ def _predict(fit: FitResult, leave_out: LeaveOut, part: HoldOutPart, bounds: Bou
     names, data_sets = fit.names, fit.data_sets
     of_tests = part.rows(data_sets)
     rows = np.pad(of_tests, (0, fit.residual.size - of_tests.size))  # priors are not held out
-    if undetermined := [names[fit.moving[i]] for i in np.flatnonzero(leave_out.undetermined(rows))]:
+    if undetermined := [names[fit.inner_indices[i]] for i in np.flatnonzero(leave_out.undetermined(rows))]:
         reason = f"the other tests do not determine {', '.join(undetermined)}"
         return Skipped(part.name, reason, tuple(dict.fromkeys(map(effect_name_of, undetermined))))
     is_step = leave_out.step(rows) is not None

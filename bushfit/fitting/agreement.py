@@ -40,7 +40,7 @@ _ALL = 0.99
 class LeaveOut:
     """Linearised fit that predicts how its parameters and residuals would change if some residuals were left out.
 
-    A row is one of the n whitened residuals.
+    A row is one of the n whitened residuals. The change is one Gauss-Newton step, which is exact for a linear model.
 
     Args:
         basis: orthonormal basis of the column space of the Jacobian of the whitened residuals, (n, m).
@@ -58,7 +58,7 @@ class LeaveOut:
     def from_fit(cls, jacobian: Array, residual: Array) -> "LeaveOut":
         """Build the linearised fit from its whitened residuals, (n,), and their derivatives by fit coordinate, (k, n).
 
-        Combinations of parameters that even all rows together do not determine are kept unchanged.
+        Combinations of parameters that all rows together do not determine keep their values.
         """
         basis, size, directions = np.linalg.svd(jacobian.T, full_matrices=False)
         determined = size > _LEAST_SEEN * size.max(initial=0.0)
@@ -74,8 +74,8 @@ class LeaveOut:
     def step(self, rows: Array) -> Array | None:
         """Change of the k fitted parameters in their coordinates, (k,), if `rows` (indices or mask) are left out.
 
-        The change is one Gauss-Newton step, which is exact for a linear model. None if the step is too long to predict
-        a refit, or if the remaining rows do not determine one of the parameters.
+        None if the Gauss-Newton step is too long to predict a refit, or if the remaining rows do not determine a
+        parameter.
         """
         if self.undetermined(rows).any():
             return None
@@ -128,16 +128,16 @@ class LeaveOut:
         return pull
 
     def _information(self, rows: Array) -> Array:
-        """Fisher information of a fit without the given rows (indices or mask), along the m basis vectors, (m, m)."""
+        """Fisher information of a fit without the rows `rows` (indices or mask), along the basis vectors, (m, m)."""
         return np.eye(self.components.size) - self.basis[rows].T @ self.basis[rows]
 
     def _basis_step(self, rows: Array) -> Array:
-        """Gauss-Newton step of a fit without the given rows (indices or mask), along the m basis vectors, (m,)."""
+        """Gauss-Newton step of a fit without the rows `rows` (indices or mask), in components along the basis, (m,)."""
         return -np.linalg.solve(self._information(rows), self.components - self.basis[rows].T @ self.residual[rows])
 
 
 def misfits(model: Model, fitted: Sequence[MeasuredTest], unfitted: Sequence[MeasuredTest] = ()) -> tuple[Misfit, ...]:
-    """Agreement of a model with each test, and with each run (frequency or amplitude sweep) of tests with several runs.
+    """Misfit of a model to each test, and to each run (frequency or amplitude sweep) of tests with several runs.
 
     Args:
         model: fitted model.
@@ -175,7 +175,7 @@ def misfits(model: Model, fitted: Sequence[MeasuredTest], unfitted: Sequence[Mea
 def expected_errors(
     model: Model, fitted: Sequence[MeasuredTest], unfitted: Sequence[MeasuredTest] = (), fit: FitResult | None = None
 ) -> tuple[ExpectedError, ...]:
-    """Expected errors of a fitted model in stiffness and loss factor: limits for 95 % of the points of a direction.
+    """Expected errors of a fitted model in stiffness and loss factor: 95 % of a direction's points have smaller errors.
 
     Each run of a fitted test is held out and predicted by a fit to the other runs, if the other runs determine all
     parameters and change no parameter by much. Tests that were not fitted are predictions already. If fewer than half
@@ -194,14 +194,14 @@ def expected_errors(
     """
     parts = list[tuple[str, Array, bool]]()
     if fit:
-        whole = LeaveOut.from_fit(fit.jacobian[fit.moving], fit.residual)
+        whole = LeaveOut.from_fit(fit.jacobian[fit.inner_indices], fit.residual)
         per_coordinate = fit.coordinates.slopes(model.values)[:, None]
     for test, rows in zip(fitted, residual_slices(fitted), strict=True):
         modelled = test.noise_free(model).measured
         if not fit:
             parts.append((str(test.direction), _absolute_difference(modelled, test.measured), False))
             continue
-        slopes = (log_slopes(model, test, fit.names) * per_coordinate)[fit.moving]
+        slopes = (log_slopes(model, test, fit.names) * per_coordinate)[fit.inner_indices]
         for _, points in _runs(test):
             residuals = np.broadcast_to(points, (test.residuals_per_point, test.size // test.residuals_per_point))
             step = whole.step(rows.start + np.flatnonzero(residuals))
@@ -216,7 +216,7 @@ def expected_errors(
 
 
 def prior_uses(solution: FitResult, covariance: Covariance) -> dict[str, PriorUse]:
-    """Compare each prior of a fit with the tests.
+    """Compare each prior of a fit with the tests: its share in the estimate, and its distance from what the tests show.
 
     Args:
         solution: result of the fit.
@@ -231,7 +231,7 @@ def prior_uses(solution: FitResult, covariance: Covariance) -> dict[str, PriorUs
         are right. Then v/S is the weight of the prior. If prior and tests agree, the estimate differs from the mean of
         the prior with the variance V + S - 2 v, which is S - v for right weights.
     """
-    moving, model = solution.moving, solution.model
+    moving, model = solution.inner_indices, solution.model
     names, uses = [solution.names[i] for i in moving], dict[str, PriorUse]()
     rows = solution.jacobian[moving]
     linear = np.linalg.pinv(rows @ rows.T, hermitian=True)

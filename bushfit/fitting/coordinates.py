@@ -26,7 +26,7 @@ _LEAST_SIZE = 0.05
 
 @dataclass(frozen=True)
 class Coordinates:
-    """Map between parameter values and dimensionless coordinates: ln value, or value over typical size.
+    """Map between parameter values and the coordinates that a fit varies: ln value, or value / typical size.
 
     Args:
         names: names of the k parameters.
@@ -42,7 +42,7 @@ class Coordinates:
         return cls(tuple(names), tuple(model.parameters[name] for name in names))
 
     def forward(self, name: str, value: float) -> float:
-        """Convert the value of one parameter [SI] to its dimensionless fit coordinate, mostly the natural log."""
+        """Convert the value of one parameter [SI] to its coordinate: ln value, or value / typical size."""
         parameter = self.parameters[self.names.index(name)]
         return float(np.log(value)) if parameter.log else value / parameter.typical
 
@@ -64,7 +64,7 @@ class Coordinates:
 
 
 def relative_sizes(model: Model, names: Sequence[str]) -> Array:
-    """Change of each parameter's fit coordinate per relative change dp/p of the parameter, (k,): 1 if it is ln p."""
+    """Derivatives of k parameter coordinates with respect to relative changes dp/p, (k,): 1 for a coordinate ln p."""
     pairs = [(model.parameters[name], abs(model.values[name])) for name in names]
     return np.array(
         [1.0 if parameter.log else max(value / parameter.typical, _LEAST_SIZE) for parameter, value in pairs]
@@ -106,16 +106,16 @@ def prior_rows(model: Model, names: Sequence[str]) -> tuple[Array, Array]:
 
 
 def prior_covariance(prior: Prior, coordinates: Coordinates) -> Array:
-    """Covariance of a prior in the coordinates of k of its parameters, (k, k)."""
+    """Covariance of a prior in the coordinates of those k parameters to which it applies, (k, k)."""
     indices = [prior.names.index(name) for name in coordinates.names]
     size = coordinates.slopes(dict(zip(prior.names, prior.mean.tolist(), strict=True)))
     return np.asarray(prior.covariance[np.ix_(indices, indices)] / np.outer(size, size))
 
 
 def coordinate_changes(model: Model, names: Sequence[str], changed: Sequence[str]) -> Array:
-    """Derivatives of parameter coordinates with respect to free parameters' coordinates, for the chain rule with ties.
+    """Derivatives of parameters' coordinates with respect to those of the free parameters, for parameters with ties.
 
-    A free parameter changes only with its own coordinate; a tied parameter changes with those in its formula.
+    A free parameter changes with its own coordinate only; a tied parameter changes with the parameters in its formula.
 
     Args:
         model: model with its ties.

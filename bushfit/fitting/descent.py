@@ -61,10 +61,10 @@ class Descent:
         residual: whitened residuals of the best model, (n,).
         jacobian: derivatives of the residuals with respect to the coordinates, (k, n).
         tolerance: expected relative fall of chi-square below which the fit has converged; None for an absolute fall of
-            0.01, which is fine enough to compare models.
+            0.01, which suffices to compare models.
         evaluations: number of model evaluations so far.
         converged: True after the last step.
-        damping: damping of the next step, relative to the curvature.
+        damping: Levenberg-Marquardt damping of the next step, relative to the curvature.
         growth: factor on the damping if the next step fails.
         last: last successful step, (k,), and the second derivative of the residuals along it, (n,); None before one.
     """
@@ -189,7 +189,7 @@ class Descent:
 
     @cached_property
     def _reach(self) -> tuple[Array, Array]:
-        """Smallest and largest coordinate that each parameter may reach in the next step, (k,) each."""
+        """Smallest and largest coordinates after the next step, by the bounds and the limit of a step, (k,) each."""
         parameters, (low, high) = self.problem.coordinates.parameters, self.problem.limits
         longest = np.array([_LONGEST_STEP if parameter.log else np.inf for parameter in parameters])
         return np.maximum(low, self.point - longest), np.minimum(high, self.point + longest)
@@ -227,7 +227,8 @@ class Descent:
     def _bend(self, step: Array, damping: float) -> Array:
         """Second-order correction of a damped step, which bends along a curved valley of chi-square.
 
-        The curvature is known from the last successful step. If that step had another direction, the correction is 0.
+        The second derivative is known along the last successful step. If that step had another direction, the
+        correction is 0.
 
         Args:
             step: damped step of the k parameter coordinates, (k,).

@@ -81,12 +81,12 @@ class FittedTests:
     @property
     def free_jacobian(self) -> Array:
         """Derivatives of the whitened residuals with respect to the k parameter coordinates not at a bound, (k, n)."""
-        return self.solution.jacobian[self.solution.moving]
+        return self.solution.jacobian[self.solution.inner_indices]
 
     @cached_property
     def slopes(self) -> Array:
         """Derivatives of ln K at the p points with respect to the k parameter coordinates not at a bound, (k, p)."""
-        model, moving = self.solution.model, self.solution.moving
+        model, moving = self.solution.model, self.solution.inner_indices
         names = [self.solution.names[i] for i in moving]
         slopes = list[Array]()
         for data_set in self.data_sets:
@@ -95,12 +95,12 @@ class FittedTests:
 
     @cached_property
     def _blocks(self) -> list[tuple[MeasuredTest, slice, Array | None, Array]]:
-        """Tests, with the combinations of their residuals that depend on the complex stiffness.
+        """Parts of the residuals that a change of the stiffness alters, one entry per test.
 
         Returns:
-            For each test: the test; the slice of its n residuals; the two combinations as orthonormal columns, (n, 2),
-            or None for a sweep, of which all residuals change; and their changes, (2, 2), for stiffness changes of 1
-            and i [N/m or N m/rad].
+            The test; the slice of its n residuals; orthonormal columns of the two altered combinations of a loop's
+            residuals, (n, 2), or None for a sweep, of which all residuals change; and the changes of the two
+            components, (2, 2), for stiffness changes of 1 and i [N/m or N m/rad].
         """
         units, blocks = np.array([[1.0], [1.0j]]), list[tuple[MeasuredTest, slice, Array | None, Array]]()
         for test, rows in zip(self.data_sets, residual_slices(self.data_sets), strict=True):
@@ -112,9 +112,10 @@ class FittedTests:
         return blocks
 
     def project(self, rows: Array) -> Array:
-        """Reduce whitened residuals of all tests, (..., n), to the d combinations that depend on the model's stiffness.
+        """Reduce whitened residuals of all tests, (..., n), to the d components that the model's stiffness can change.
 
-        These are all residuals of a sweep, and two combinations of the residuals of a loop.
+        Returns:
+            Components, (..., d): all residuals of a sweep, and two combinations of the residuals of a loop.
         """
         parts = [
             rows[..., block] if directions is None else rows[..., block] @ directions
@@ -136,13 +137,13 @@ class FittedTests:
         return np.concatenate([test.residual_change(change, self.solution.model) for test, change in pairs], axis=-1)
 
     def columns(self, shapes: Array) -> Array:
-        """Convert relative changes of the stiffness into changes of the d combinations of residuals that they alter.
+        """Convert relative changes of the stiffness into changes of the d components of the residuals, see `project`.
 
         Args:
             shapes: c relative changes of the stiffness at the operating points, complex (c, p).
 
         Returns:
-            Changes of these combinations, (c, d).
+            Changes of the components, (c, d).
         """
         columns, first, changes = [], 0, shapes * self._stiffness
         for test, _, directions, components in self._blocks:
@@ -246,7 +247,7 @@ class Discrepancy:
 
     @cached_property
     def best(self) -> tuple[float, float]:
-        """Largest gain in log likelihood through an error of the model, and the size of this error relative to |K|."""
+        """Largest increase of the log likelihood by an error of the model, and this error's size relative to |K|."""
         gains = self.likelihood.gains(self.sizes)
         return float(gains.max()), float(self.sizes[gains.argmax()])
 
@@ -272,10 +273,10 @@ class Discrepancy:
 
 
 def averaged(processes: Sequence[Discrepancy]) -> Unnamed:
-    """Average Gaussian processes of a model's error, weighted by their likelihood, to a correction of the model.
+    """Average several Gaussian processes of a model's error, weighted by likelihood, into one correction of the model.
 
-    Nodes and groups are those of the likeliest process; lengths are geometric means. Few degrees of freedom determine
-    the size, so standard deviations are enlarged until a normal 95 % interval is as wide as that of Student's t.
+    Nodes and groups are those of the likeliest process; lengths are geometric means. The size has few degrees of
+    freedom, so standard deviations are enlarged until a normal 95 % interval is as wide as that of Student's t.
 
     Returns:
         Correction at the nodes, with its standard deviation, both relative to the stiffness.
@@ -316,7 +317,7 @@ def discrepancies(tests: FittedTests) -> list[Discrepancy]:
 
 
 def process_columns(solution: FitResult, correction: Unnamed) -> Array:
-    """Changes of the residuals of a fit due to the Gaussian process of a correction of its model.
+    """Changes of a fit's residuals due to the Gaussian process that a correction of its model describes.
 
     Args:
         solution: fit of the model without the correction.

@@ -43,13 +43,13 @@ _SPRINGPOT = ("m", "alpha")
 
 
 class _Combination(NamedTuple):
-    """Combination of parameters, a modulus, that tests may determine even if they do not determine each parameter.
+    """Modulus computed from several parameters, which tests may determine even if they do not determine each parameter.
 
     Args:
         formula: formula in the names of the model's parameters.
         value: function from parameter values by name, with omega [rad/s], to the modulus [Pa]; accepts complex values.
         names: names of the parameters in the formula.
-        open_with: names of parameters; the combination is reported if one of them is not determined. Empty: `names`.
+        open_with: names of parameters; the modulus is reported if one of them is not determined. Empty for `names`.
         remark: meaning of the modulus.
     """
 
@@ -88,7 +88,7 @@ def undetermined_parameters(
 ) -> list[str]:
     """Warnings about parameters of a fitted model that the tests do not determine; none if all are determined.
 
-    There is one sentence for each group of parameters that share open directions, with their standard errors.
+    There is one sentence, with standard errors, for each group of parameters whose errors are correlated.
 
     Args:
         model: fitted model.

@@ -45,7 +45,7 @@ def level_errors(
         maximum: largest standard deviation of gain and of phase [rad] that the rig may have.
 
     Returns:
-        Errors, with their degrees of freedom and significance.
+        Standard deviations of the errors, with degrees of freedom and significance.
 
     Notes:
         An error of a level adds v u u^T to the covariance of the whitened residuals, where u is the whitened unit error

@@ -120,7 +120,7 @@ def _steady_part(loop: Loop, time: Array, motion: Array) -> tuple[Loop, str | No
 
 
 def _cut(loop: Loop, first: float, last: float) -> Loop:
-    """Return a loop with only its rows from the time `first` to the time `last`, both in s."""
+    """Keep only the rows of a loop from the time `first` [s] to the time `last` [s]."""
     return loop.select(slice(np.searchsorted(loop.time, first), np.searchsorted(loop.time, last, side="right")))
 
 
@@ -164,7 +164,7 @@ def _fundamental(loop: Loop, clock: Array, displacement: Array) -> tuple[float, 
 
 
 def _of_one_cycle(loop: Loop, clock: Array, x: Array, crossings: Array) -> tuple[float, float]:
-    """Frequency [Hz] and number of cycles of a loop that crosses its middle once upwards and once downwards.
+    """Frequency [Hz] and number of cycles of a loop whose motion crosses its middle once upwards and once downwards.
 
     Args:
         loop: steady cycles of the record.
@@ -278,7 +278,7 @@ def waveform(coefficients: Array) -> str:
 
 
 def wrong_clock(loop: Loop, coefficients: Array) -> str | None:
-    """Note on a loop without a time column whose rows, if evenly spaced in time, contradict the stated waveform.
+    """Sentence on a loop without a time column whose rows cannot be evenly spaced in time, as the waveform shows.
 
     Args:
         loop: steady cycles, with the time that follows from the stated waveform.

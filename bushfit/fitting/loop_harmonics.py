@@ -134,13 +134,13 @@ def loop_harmonics(loop: Loop, frequency: float, cycles: float, *, from_rest: bo
     of_motion, of_force = inliers.T
     freedom = np.maximum(np.count_nonzero(inliers, axis=0) - 2 * order - 1, 1)
     motion_noise = float(np.sqrt(np.sum(np.square(remainder[of_motion, 0])) / freedom[0]))
-    motion = _cleared(as_complex(solution[:, 0]), motion_noise, phase, values[:, 0], of_motion)
+    motion = _remove_noise(as_complex(solution[:, 0]), motion_noise, phase, values[:, 0], of_motion)
     scatter, unknowns = remove_slow_changes(phase[of_force], remainder[of_force, 1])
     force_noise = float(np.sqrt(np.sum(np.square(scatter)) / max(freedom[1] - unknowns, 1)))
     return LoopHarmonics(motion, as_complex(solution[:, 1]), force_noise, outliers)
 
 
-def _cleared(coefficients: Array, noise: float, phase: Array, displacement: Array, inliers: Array) -> Array:
+def _remove_noise(coefficients: Array, noise: float, phase: Array, displacement: Array, inliers: Array) -> Array:
     """Remove noise from the harmonics of a displacement: keep those above the noise, or those of an ideal triangle.
 
     Args:
@@ -243,7 +243,7 @@ def _inliers(columns: Array, values: Array, solution: Array, stuck: Array) -> Ar
 
 
 def _noise(solution: Array, residual: Array) -> float:
-    """Standard deviation of one row: robust scatter of the residuals, (n,), but at least that of the best rigs."""
+    """Standard deviation of one row's noise: robust scatter of residuals, (n,), but not below that of the best rigs."""
     return max(MEDIAN_TO_SIGMA * float(np.median(np.abs(residual))), FLOOR * abs(as_complex(solution)[1]))
 
 

@@ -43,9 +43,10 @@ class MeasuredLoop(MeasuredBase):
         noise: standard deviation of one row's force [N or N m].
         coefficients: complex harmonics of the displacement, mean first [m or rad].
         half_range: half of the range of the measured force without outliers [N or N m].
-        datum: mean force [N or N m] that the fit subtracts, because a zero error of the sensor, a preload and the
-            memory of the rubber cannot be distinguished: the motion is not about zero or starts from rest at another
-            position, the force has a preload, or other cycles precede the loop. None: the fit uses the force itself.
+        datum: mean force [N or N m] that the fit subtracts; None if it uses the force itself. It is subtracted if the
+            motion is not about zero or starts from rest at another position, if the force has a preload, or if other
+            cycles precede the loop: the zero of the sensor, a preload and the rubber's memory cannot then be
+            distinguished.
         record_notes: sentences on parts of the record that were left out, and on times that do not agree with the rows.
         faulty_rows: by column, indices of faulty rows and their distances from the harmonics in units of noise.
         first_row: index of the loop's first row in the whole record.
@@ -54,8 +55,8 @@ class MeasuredLoop(MeasuredBase):
             with two residuals. This is needed if a stiffness is added that is known only at the loop's frequency.
         gain_error: standard deviation of the relative gain error of the whole record, from the accuracy class of its
             rig; also of the offset of its force, relative to half the force range.
-        gain_weighs: True if the gain error is part of the noise by which residuals are weighted, as for a class stated
-            in [rig]. An assumed gain error only widens the errors of fitted parameters.
+        gain_weighs: True if the gain error, as for a class stated in [rig], is part of the noise by which residuals are
+            weighted. If False, the gain error only widens the errors of fitted parameters.
         first_harmonic_errs: True if the model error includes the first harmonic of the force.
 
         histories: histories of the motion by their extent, once computed; copies of the loop share them.
@@ -98,17 +99,17 @@ class MeasuredLoop(MeasuredBase):
 
     @property
     def amplitude(self) -> Array:
-        """Zero-to-peak amplitude [m or rad] of the only point of a loop, (1,), or of all sweep points, (n,)."""
+        """Zero-to-peak amplitude of the loop's motion, (1,) [m or rad]."""
         return self.history(is_transient=False).amplitude
 
     @property
     def conditions(self) -> RubberConditions:
-        """Temperature of the rubber and its earlier strains, in a loop or at each point of a sweep."""
+        """Temperature of the rubber in the loop, and its earlier strains."""
         return self.test_conditions
 
     @cached_property
     def measured(self) -> Array:
-        """Complex stiffness of the loop's first harmonic [N/m or N m/rad], (1,); of a sweep, of each point, (n,)."""
+        """Complex stiffness of the loop's first harmonic, (1,) [N/m or N m/rad]."""
         root = np.sqrt(self.weights)
         _, force = as_complex(least_squares(basis(self.phase, 1) * root[:, None], self.measured_force * root))
         return np.array([force / self.coefficients[1]])
@@ -160,24 +161,24 @@ class MeasuredLoop(MeasuredBase):
 
     @property
     def size(self) -> int:
-        """Number of residuals of the test: rows or bins of a loop, two for each point of a sweep."""
+        """Number of residuals: the rows of the loop or its bins of phase, or 2 if only the first harmonic is used."""
         return 2 if self.fundamental_only else int(self.measured_force.size)
 
     @cached_property
     def residual_count(self) -> int:
-        """Number of residuals with weight, for degrees of freedom; if the noise is correlated, the effective number."""
+        """Number of residuals with weight, for degrees of freedom; if noise is correlated, the equivalent number."""
         if self.fundamental_only:
             return 2
         return round(self.row_noise.observed_share * np.count_nonzero(self._usable_rows))
 
     @property
     def independent_count(self) -> float:
-        """Number of independent residuals, which sets the uncertainty of a mean over the test."""
+        """Number of independent residuals, which determines the uncertainty of a mean over the loop."""
         return self.residual_count / (1.0 if self.fundamental_only else self.row_noise.rows_as_one)
 
     @property
     def relative_noise(self) -> float:
-        """Standard deviation of a row's noise relative to half the force range, or of a sweep point relative to |K|."""
+        """Standard deviation of the noise of one row, relative to half the force range."""
         return self.noise / self.half_range
 
     def fundamental(self) -> Self:
@@ -222,7 +223,10 @@ class MeasuredLoop(MeasuredBase):
         return ((self.response(model) - self.measured_force) / self.half_range)[None]
 
     def relative(self, model: Model) -> Array:
-        """Magnitude of the relative difference at each row, less its mean (the zero of a load cell is unknown)."""
+        """Absolute difference of model and measured force at rows with weight, relative to half the force range.
+
+        The mean difference is subtracted, because the zero of a load cell is unknown.
+        """
         difference = self.relative_difference(model)[0, self.weights > 0.0]
         return np.abs(difference - np.mean(difference))
 
@@ -240,11 +244,16 @@ class MeasuredLoop(MeasuredBase):
         return np.where(self.weights > 0.0, self.misfit(model), distance)
 
     def outlier_indices(self, model: Model) -> Array:
-        """Indices of the rows whose force is far from the harmonics fitted to the loop, (k,); the model is not used."""
+        """Indices of the rows whose force is far from the harmonics fitted to the loop, (k,); `model` is not used."""
         return self.faulty_rows["force"].rows
 
     def outliers(self, points: Array, model: Model) -> Iterator[Outlier]:
-        """Yield all rows that are far from the loop's harmonics, with the distance [noise]; no argument is used."""
+        """Yield all rows that are far from the loop's harmonics, with their distance in units of noise.
+
+        Args:
+            points: not used for a loop; for a sweep, indices of the outliers.
+            model: not used for a loop.
+        """
         file = str(self.source.file) if self.source else None
         before = self.first_row + (self.test.part.first_row if self.test.part else 0)
         for column, (rows, distance) in self.faulty_rows.items():
@@ -252,10 +261,10 @@ class MeasuredLoop(MeasuredBase):
                 yield Outlier(self.name, file, row + before + 1, column, noise_units)
 
     def smooth_changes(self) -> Array:
-        """Changes of the whitened residuals due to 11 smooth force changes of half the force range, (11, size).
+        """Changes of the whitened residuals due to 11 smooth changes of the force by half its range, (11, size).
 
-        These are a constant, and the columns of `basis` for five harmonics; with `fundamental_only` only the first
-        harmonic is not 0.
+        The changes are a constant, and a cosine and a sine of each of five harmonics. With `fundamental_only`, all but
+        the first harmonic are 0.
         """
         rows = self.force_changes(basis(self.phase, SMOOTH_HARMONICS).T)
         if self.fundamental_only:
@@ -273,7 +282,7 @@ class MeasuredLoop(MeasuredBase):
 
     @cached_property
     def _per_noise(self) -> Array:
-        """Reciprocal of the standard deviation of each row's force [1/N or 1/(N m)], (n,); 0 for unused rows."""
+        """Reciprocal of the standard deviation of each row's force, (n,) [1/N or 1/(N m)]; 0 for unused rows."""
         return np.sqrt(self.weights) / (self.noise * self.row_noise.row_scale)
 
     def _whiten_rows(self, rows: Array) -> Array:
@@ -286,14 +295,15 @@ class MeasuredLoop(MeasuredBase):
         return white @ self._fundamental if self.fundamental_only else white
 
     def force_changes(self, waves: Array) -> Array:
-        """Changes of the whitened residuals, (c, size), due to force changes relative to half the range, (c, n)."""
+        """Changes of the whitened residuals, (c, size), by force changes relative to half the range, (c, n)."""
         return self.whiten(waves * (self._per_noise * self.half_range))
 
     def whiten(self, difference: Array) -> Array:
-        """Whiten changes of the force at the rows in units of noise, (..., n): unit variance, no correlation.
+        """Whiten changes of the force at the rows, in units of noise, (..., n), so that noise has unit variance.
 
         Returns:
-            Whitened residuals, (..., size), without the correlation of neighbouring rows and the errors they share.
+            Whitened residuals, (..., size), without the correlation due to neighbouring rows and errors that rows
+            share.
         """
         return self.shared_errors.whiten(self._whiten_rows(difference))
 

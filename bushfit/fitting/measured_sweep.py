@@ -120,7 +120,7 @@ class MeasuredSweep(MeasuredBase):
 
     @property
     def relative_noise(self) -> float:
-        """Standard deviation of a point relative to |K|: root mean square over gain and phase of all lines."""
+        """Standard deviation of a point, relative to |K|: root mean square over gain and phase of all sweeps."""
         return float(np.sqrt(np.mean(np.square(list(self.noise.random.values())))))
 
     def without(self, points: Array) -> Self:
@@ -269,7 +269,7 @@ class MeasuredSweep(MeasuredBase):
         return np.stack((difference.real, difference.imag))
 
     def scaled_distance(self, deviation: Array, *, shared: bool = True) -> Array:
-        """Magnitude of deviations (gain + i phase, complex (n,)) in units of point-to-point noise, (n,).
+        """Magnitude of each point's deviation in units of the scatter from point to point, (n,).
 
         Args:
             deviation: relative differences in magnitude + i differences in phase [rad], complex (n,).
@@ -285,7 +285,7 @@ class MeasuredSweep(MeasuredBase):
         return self.scaled_distance(self.deviation(self.response(model))) / np.sqrt(2.0)
 
     def displayed_residual(self, model: Model) -> Array:
-        """Residuals for charts in units of noise, (2 n,), whitened; points without weight are in units of scatter."""
+        """Whitened residuals for charts, (2 n,); those of points without weight are in units of the scatter alone."""
         deviation = self.deviation(self.response(model))
         distances = self.covariance.scaled(deviation).ravel()
         return np.where(np.tile(self.weights > 0.0, 2), self.whiten(deviation), distances)

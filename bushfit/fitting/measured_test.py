@@ -84,7 +84,7 @@ class MeasuredBase(ABC):
     @property
     @abstractmethod
     def unit_model_error(self) -> SharedErrors:
-        """Model error of 100 %, as errors that the residuals share."""
+        """Error of the model of 100 %, as independent errors that each change several residuals."""
 
     def with_model_error(self, size: float) -> Self:
         """Return the test with a model error of this size, relative to |K| or half a loop's force range."""
@@ -94,7 +94,7 @@ class MeasuredBase(ABC):
 
     @cached_property
     def model_errors(self) -> SharedErrors:
-        """Model error of the test, as errors that the residuals share."""
+        """Error of the model of the size `model_error`, as independent errors that each change several residuals."""
         return self.unit_model_error.scaled(self.model_error)
 
     def weighted(self, weight: Array) -> Self:
@@ -160,7 +160,7 @@ class MeasuredBase(ABC):
         return {}
 
     def recall(self, key: str, model: Model, names: Any = ()) -> Array | None:
-        """Return the array that `keep` cached for the same key, model and parameter names; None if there is none.
+        """Return the array that `keep` cached for the same key, model and parameter names, or None.
 
         Args:
             key: name of the cached quantity.

@@ -72,10 +72,10 @@ _MAXIMUM_ROUNDS, _SETTLED = 12, 0.02
 def with_excess_errors(
     plain_fit: FitResult, bounds: Bounds, rig: RigSettings, refit: Callable[[LevelErrors], FitResult]
 ) -> tuple[FitResult, Unnamed | None, list[str]]:
-    """Extend a fit by the errors that its tests show beyond the noise: errors of the model, or of levels.
+    """Repeat a fit with errors that its tests show beyond the noise: of the model, or of levels (constant amplitudes).
 
-    Levels that disagree by more than chance explains may do so because of the rig or of the model; the fit then
-    includes errors of both.
+    If levels disagree by more than chance explains, the rig or the model may be the cause, so the fit includes errors
+    of both.
 
     Args:
         plain_fit: least-squares fit with the noise alone.
@@ -176,7 +176,7 @@ def closest_fit(plain_fit: FitResult, bounds: Bounds) -> tuple[FitResult, float]
                 ends.append(Descent.start(FitProblem(start, weighted, names, bounds), TOLERANCE).run().solution)
         solution = min(ends, key=lambda end: end.chi_square)
         starts, before = [solution.model], size
-        size = likeliest_model_error(solution.model, tests, [names[i] for i in solution.moving])
+        size = likeliest_model_error(solution.model, tests, [names[i] for i in solution.inner_indices])
         if abs(np.log(size / before)) < _SETTLED or size >= SIZES[-1]:
             break
     return solution, size
@@ -257,7 +257,7 @@ def log_likelihood(solution: FitResult, prior_precision: Mapping[str, float]) ->
         shares = columns[best] * SIZES[likelihoods[best].gains(SIZES).argmax()]
         across = shares @ tests.project(tests.free_jacobian).T
         information = information - across.T @ np.linalg.solve(shares @ shares.T + np.eye(len(shares)), across)
-    information = information + np.diag([prior_precision.get(solution.names[i], 0.0) for i in solution.moving])
+    information = information + np.diag([prior_precision.get(solution.names[i], 0.0) for i in solution.inner_indices])
     log_size = sum(loop.shared_errors.log_det_covariance for loop in split_by_kind(tests.data_sets)[0])
     log_size += float(np.linalg.slogdet(information)[1])
     for prior in solution.model.constraints.priors:
@@ -279,7 +279,7 @@ def _exceeds_noise(solution: FitResult, rig: RigSettings) -> bool:
 
 
 def _is_smooth(tests: FittedTests) -> bool:
-    """True if a smooth error of the model is more probable than noise and errors of the rig's class alone."""
+    """True if the misfit is more probable with a smooth error of the model than with errors of noise and rig alone."""
     names = tuple(dict.fromkeys(tests.directions.tolist()))
     compound = Discrepancy.over_tests(tests, (names,), COMPOUND_LENGTHS, _FEW)
     if compound.best[0] > _SHOWS and compound.likelihood.log_evidence(SIZES) > 0.0:  # as probable before as its absence
@@ -294,12 +294,14 @@ def _is_smooth(tests: FittedTests) -> bool:
 
 
 def _with_unseen_level_errors(tests: Sequence[MeasuredTest], rig: RigSettings) -> list[MeasuredTest]:
-    """Add the expected errors that all runs of a level share to sweeps whose noise is known from repeats alone.
+    """Add errors that all runs of a level share to the noise of sweeps, if the noise was estimated from repeats alone.
 
-    A smooth error of the model follows these errors from level to level, and is uncertain by them.
+    Repeats cannot reveal such errors, and without them a smooth error of the model would follow the errors of the
+    levels.
     """
 
     def with_level(noise: SweepNoise) -> SweepNoise:
+        """Add errors of levels to a noise that has none; its size is that of the rig's accuracy class."""
         if noise.origin != "repeats":
             return noise
         gain, phase = np.maximum(class_errors(rig, UNSTATED_LEVEL), noise.level).tolist()

@@ -118,6 +118,7 @@ def sweep_noise(sweeps: Sequence[Sweep], rig: RigSettings = UNSTATED) -> SweepNo
     at_levels = [(sweep, log_stiffness_at_nominal(sweep)) for sweep in sweeps]
 
     def of_lines(without: Collection[float]) -> dict[LineKey, LineNoise]:
+        """Noise of every line of every sweep, without the given frequencies or amplitudes."""
         return {
             (sweep.name, float(held_value)): line_noise(sweep, log_stiffness, held_value, without)
             for sweep, log_stiffness in at_levels
@@ -168,7 +169,7 @@ def sweep_noise(sweeps: Sequence[Sweep], rig: RigSettings = UNSTATED) -> SweepNo
 
 
 def _scatter_growth(lines: Sequence[LineNoise]) -> tuple[float, float] | None:
-    """Exponent of the growth of the scatter along the stepped quantity, and a reference step; None without growth.
+    """Exponent of a power law of the scatter over the stepped quantity, and a reference step; None without growth.
 
     Notes:
         Squares of the deviations, divided by the mean of their line, are regressed on ln(step). Koenker's test (1981)
@@ -194,6 +195,7 @@ def _scatter_growth(lines: Sequence[LineNoise]) -> tuple[float, float] | None:
     from scipy.optimize import minimize_scalar
 
     def unlikely(exponent: float) -> float:
+        """Negative log likelihood of the deviations for an exponent of the growth."""
         parts = np.split(ratio * np.exp(-exponent * centred), np.cumsum([log.size for log in logs])[:-1])
         return sum(part.size * float(np.log(part.mean())) for part in parts)
 
@@ -262,7 +264,7 @@ def _pair(values: Array) -> tuple[float, float]:
 
 
 def _unequal(lines: Sequence[LineNoise]) -> bool:
-    """True if lines of sweeps scatter unequally, by Bartlett's test (1937) of the mean variance of gain and phase."""
+    """True if the scatter of lines (runs at one constant value) differs, by Bartlett's test (1937)."""
     variance = np.array([line.variance.mean() for line in lines])
     freedom = np.array([2.0 * line.freedom for line in lines])
     if variance.size < 2 or not variance.all():

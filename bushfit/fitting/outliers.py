@@ -133,7 +133,7 @@ def outlying_points(
 
     A repeated point must also differ from its repeats. If two or more repeats agree and the point differs from them,
     its neighbours are not compared, so that neither adjacent outliers nor a misfit of the model can hide the outlier.
-    Of several such points at one operating point, the farthest is an outlier even if it is near the model.
+    If several points of one operating point qualify, the farthest is an outlier even if it is near the model.
 
     Args:
         deviation: deviation of each point from the model, gain + i phase, complex (n,).

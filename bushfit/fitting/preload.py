@@ -141,7 +141,7 @@ def _probability_of_chance(data: PreparedCampaign, tests: Sequence[MeasuredTest]
 
 
 def _fits(data: PreparedCampaign, problem: FitProblem, fixed: Sequence[str]) -> tuple[FitResult, FitResult]:
-    """Fit the tests of a problem without and with the free parameters of the effect of preload.
+    """Fit the tests of a problem twice: without and with the effect of preload.
 
     Args:
         data: campaign with prepared tests.

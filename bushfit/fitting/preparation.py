@@ -52,7 +52,7 @@ def prepare_loops(
 
 
 def with_gain_errors(loops: Sequence[MeasuredLoop], rig: RigSettings) -> list[MeasuredLoop]:
-    """Return loops with the gain error of the rig, as stated in [rig] or assumed.
+    """Return loops with the gain error of the rig (relative error of all forces), as stated in [rig] or assumed.
 
     Notes:
         All n repeats of a loop share the gain error. It is represented by independent errors that are larger by
@@ -66,12 +66,12 @@ def with_gain_errors(loops: Sequence[MeasuredLoop], rig: RigSettings) -> list[Me
 
 
 def with_gain_weighting(data_sets: Iterable[MeasuredTest], *, weigh: bool) -> list[MeasuredTest]:
-    """Return the tests; if `weigh` is True, the noise by which loop residuals are weighted includes the gain error."""
+    """Return tests whose fit weights include the gain errors of loops (`weigh`), or whose uncertainty alone does."""
     return [replace(test, gain_weighs=weigh) if isinstance(test, MeasuredLoop) else test for test in data_sets]
 
 
 def repeats_of(loops: Sequence[MeasuredLoop]) -> Array:
-    """Mask of the pairs of loops that are repeats (same direction, preload, amplitude and frequency), (n, n)."""
+    """Mask of the pairs among n loops that are repeats: same direction, preload, amplitude and frequency, (n, n)."""
     conditions = np.log([(*loop.amplitude, *loop.frequency) for loop in loops]).reshape(-1, 2)
     place = np.array([f"{loop.direction} {loop.test.preload}" for loop in loops])
     return np.all(np.abs(conditions[:, None] - conditions) <= SAME_LOOP, axis=-1) & (place[:, None] == place)

@@ -207,7 +207,7 @@ class FitResult:
         return [name for name in self.model.values if name not in self.names]
 
     def stage(self, fixed: Collection[str] = ()) -> FitProblem:
-        """Problem of this fit for `covariance`, with the weights of its tests; the `fixed` parameters are not free."""
+        """Problem of this fit for `covariance`, with the tests' weights; the parameters in `fixed` are not free."""
         names = [name for name in self.names if name not in fixed]
         return replace(self.problem, tests=self.covariance_tests or self.problem.tests, names=names)
 
@@ -228,17 +228,17 @@ class FitResult:
         return self.chi_square / max(count - len(self.names), 1)
 
     @property
-    def moving(self) -> list[int]:
+    def inner_indices(self) -> list[int]:
         """Indices of the fitted parameters that are not at a bound."""
         return [i for i, name in enumerate(self.names) if name not in self.at_bound]
 
     @property
-    def flat(self) -> bool:
-        """True if a further Gauss-Newton step is expected to lower chi-square by no more than chance would."""
-        return self.gain(self.at_bound) <= Z95**2 * max(self.chi_square / self.residual.size, 1.0)
+    def at_minimum(self) -> bool:
+        """True if chi-square is minimal within chance: a further Gauss-Newton step would not lower it significantly."""
+        return self.expected_fall(self.at_bound) <= Z95**2 * max(self.chi_square / self.residual.size, 1.0)
 
-    def gain(self, fixed: Collection[str]) -> float:
-        """Fall of chi-square expected from one Gauss-Newton step of all parameters not named in `fixed`."""
+    def expected_fall(self, fixed: Collection[str]) -> float:
+        """Decrease of chi-square expected from one Gauss-Newton step of all parameters not named in `fixed`."""
         free = [i for i, name in enumerate(self.names) if name not in fixed]
         left_vectors, values, _ = np.linalg.svd(self.jacobian[free].T, full_matrices=False)
         significant = values > ROUNDING * values.max(initial=0.0)

@@ -99,7 +99,7 @@ def find_limit(
         found = fits[crossing]
         new_bounds = not set(found.at_bound) <= set(best.at_bound)
         # by which chi-square would fall there if others could leave the bounds that they met on the way
-        fall = found.gain(best.at_bound) if new_bounds and abs(crossing - start) > _FAR else 0.0
+        fall = found.expected_fall(best.at_bound) if new_bounds and abs(crossing - start) > _FAR else 0.0
         return None if fall > _HELD_BY_OTHERS * allowed**2 else model_at(crossing).values[name]
     return None
 

@@ -136,7 +136,7 @@ def _is_typical(difference: Array, log_step: Array) -> Array:
 def _about_smooth_curve(steps: Array, log_stiffness: Array) -> LineNoise:
     """Noise of a line without repeats: scatter of ln K about a smooth curve over ln(step).
 
-    The scatter is assumed if there are one or two points.
+    If the line has one or two points, the scatter is assumed.
 
     Args:
         steps: stepped frequency [Hz] or amplitude [m or rad] of each point, (n,).
@@ -215,6 +215,7 @@ def log_stiffness_at_nominal(sweep: Sweep) -> Array:
     low, span = np.log(sweep.amplitude).min(), float(np.ptp(np.log(sweep.amplitude)))
 
     def surface(amplitude: Array) -> Array:
+        """Polynomials of the smooth surface at the points' frequencies and given amplitudes [m or rad], (n, terms)."""
         over_range = 2.0 * (np.log(amplitude) - low) / span - 1.0
         return np.polynomial.legendre.legvander2d(to_unit_interval(np.log(sweep.frequency)), over_range, degrees)
 

@@ -81,7 +81,7 @@ def estimate(problem: FitProblem, *, robust: bool = False, lmfit: bool = False) 
                 softened.append(test.weighted(1.0 / np.sqrt(1.0 + (distance / scale) ** 2)))
             current = replace(problem, model=model, tests=softened)
         found = solve_with_lmfit(current) if lmfit else Descent.start(current, TOLERANCE).run().solution
-        if found.stopped and not found.flat:
+        if found.stopped and not found.at_minimum:
             raise FitError(
                 "the fit did not converge",
                 found=f"no convergence after {found.evaluations} evaluations of the model",

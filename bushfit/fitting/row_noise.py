@@ -74,10 +74,10 @@ class RowNoise:
         return max(1.0 / float(np.sum(self.filter)) ** 2, 1.0)
 
     def usable_rows(self, weight: Array) -> Array:
-        """Find the whitened rows to use: rows that have weight, as have all preceding rows in their filter.
+        """Find the rows that can be whitened, because they and the preceding rows in their filter have weight.
 
         Returns:
-            Mask, (n,).
+            Mask of the n rows, (n,).
         """
         counts = weight > 0.0
         usable = counts.copy()

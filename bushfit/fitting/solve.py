@@ -49,11 +49,13 @@ def solve_with_lmfit(problem: FitProblem) -> FitResult:
 
     @lru_cache(maxsize=2)  # tests know again the model they answered last: the best so far, and the one tried
     def model_at(*point: float) -> Model:
+        """Model at a point of the fit, given by the coordinates of its free parameters."""
         if not np.all((low <= point) & (point <= high)):
             raise _OutOfBoundsError
         return problem.model.with_values(problem.coordinates.values(point))
 
     def model_of(parameters: lmfit.Parameters) -> Model:
+        """Model with the values of lmfit's parameters."""
         return model_at(*(parameter.value for parameter in parameters.values()))
 
     # a residual that is not finite is a ValueError of lmfit, which takes roots of a covariance nobody asked for

@@ -29,7 +29,7 @@ def test_a_parameter_pushed_against_a_bound_rests_on_it_and_is_named(axial, pape
     solution = solve(FitProblem(paper_model, axial, FIVE, {"mu": (None, 1.05e6)}))
     assert dict(solution.at_bound) == {"mu": "max"}
     assert solution.model.values["mu"] == pytest.approx(1.05e6, rel=1e-2)
-    assert solution.flat
+    assert solution.at_minimum
     free = solve(FitProblem(paper_model, axial, FIVE))
     assert not free.at_bound
     assert free.chi_square < solution.chi_square
