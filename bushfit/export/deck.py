@@ -285,6 +285,6 @@ def band_omissions(prediction: Prediction) -> Iterator[str]:
     place, band = prediction.direction, prediction.stiffness
     if (width := float(np.max((band.high - band.low) / (2.0 * band.value)))) > 0.0:
         yield f"{place}: the 95 % band of up to +/-{number(100.0 * width, 2)} % of |K| is left out"
-    if prediction.if_rigs:
-        deviation = format_deviation(prediction.if_rigs.stiffness.value / band.value)
+    if prediction.if_in_rig:
+        deviation = format_deviation(prediction.if_in_rig.stiffness.value / band.value)
         yield f"{place}: if the unresolved effect belongs to the rig, |K| is {deviation}; these values are left out"

@@ -60,26 +60,25 @@ def guess_parameters(bushing: Bushing, compound: Compound) -> Knowledge:
         compound: hardness [Shore A], carbon black [phr] and polymer.
 
     Returns:
-        Starting point of a plan: estimates of mu, m, alpha, sigma_fmax and eps_half, and their covariance.
+        Estimates of mu, m, alpha, sigma_fmax and eps_half, with their covariance, from which a plan can start.
 
     Notes:
         The laws of the estimate:
 
-            E   = 0.0981 (56 + 7.66 S) / (0.137505 (254 - 2.54 S)) MPa, S in Shore A               (Gent 1958)
-            G   = E/3 = mu + Re m/2 (i omega_S)^alpha        omega_S = 1/(3 s): reading time of a durometer
-            phi = (n/1.8) / (n/1.8 + 100/density)            volume fraction of n phr of carbon black
-            X   = 1 + 2.5 phi + 14.1 phi^2                   strain of the rubber between particles   (Guth 1945)
-            q   = m/2 omega_0^alpha / mu = 0.25, alpha = 0.24               omega_0 = 2 pi 10 Hz
-            r   = sigma_fmax/(2 eps_half mu) = 0.515 (phi/phi_0)^3.5 X_0/X                             (Payne effect)
-            eps_half = 0.013 X_0/X
+            E   = 0.0981 (56 + 7.66 S) / (0.137505 (254 - 2.54 S)) MPa, S in Shore A               (Gent 1958) G   = E/3
+            = mu + Re m/2 (i omega_S)^alpha        omega_S = 1/(3 s): reading time of a durometer phi = (n/1.8) / (n/1.8
+            + 100/density)            volume fraction of n phr of carbon black X   = 1 + 2.5 phi + 14.1 phi^2
+            strain of the rubber between particles   (Guth 1945) q   = m/2 omega_0^alpha / mu = 0.25, alpha = 0.24
+            omega_0 = 2 pi 10 Hz r   = sigma_fmax/(2 eps_half mu) = 0.515 (phi/phi_0)^3.5 X_0/X
+            (Payne effect) eps_half = 0.013 X_0/X
 
         The numbers are those of the paper's bushing (natural rubber, phi_0 of 27 phr, Table 1). Three laws apply them
         to another compound: a filler network stiffens with phi^3.5, filler amplifies strain by X, and filler amplifies
         spring and springpot equally, so their ratio q is the same.
 
         Sources: A. N. Gent, Rubber Chemistry and Technology 31 (1958) 896-906, whose relation is quoted with 7.66, as
-        here, or with 7.62336, which gives 0.5 % less; E. Guth, J. Applied Physics 16 (1945) 20-25; G. Heinrich,
-        M. Klueppel, Advances in Polymer Science 160 (2002) 1-44, for phi^3.5; Garcia Tarrago et al. 2007, Table 1.
+        here, or with 7.62336, which gives 0.5 % less; E. Guth, J. Applied Physics 16 (1945) 20-25; G. Heinrich, M.
+        Klueppel, Advances in Polymer Science 160 (2002) 1-44, for phi^3.5; Garcia Tarrago et al. 2007, Table 1.
 
         The errors of ln G, ln q, ln alpha, ln r and ln eps_half are independent; their standard deviations are the
         constants of this module. They are chosen: one published and one measured compound lie inside (tests/planning),

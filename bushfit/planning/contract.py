@@ -62,7 +62,7 @@ class Noise:
 
 @dataclass(frozen=True, eq=False)
 class Knowledge:
-    """Model, parameter covariance and rig noise before the planned tests: the prior of a plan.
+    """Model, covariance of its parameters and noise of the rig, as known before the planned tests.
 
     Args:
         result: model with its likeliest parameter values, with the range of the tests so far and the warnings of their

@@ -161,7 +161,10 @@ def plan_document(
     covariances = [search.error_covariance(counts) for counts in (0 * planned, planned, standard)]
 
     def compared(error: Callable[[Array], float]) -> ErrorComparison:
-        """Entry that compares the error given by a covariance of the parameters: before, planned and standard tests."""
+        """Compare an error before further tests, with the plan and with the standard programme.
+
+        `error` computes it from a covariance of the parameters.
+        """
         before, with_plan, with_standard = map(error, covariances)
         return {"before": before, "planned": with_plan, "standard": with_standard}
 

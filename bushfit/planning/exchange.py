@@ -77,20 +77,20 @@ class Budget:
             60.0 * request.hours,
         )
 
-    def spent(self, counts: Array) -> float:
-        """Total duration [min], with set-ups, of `counts` runs of each test, (tests,)."""
+    def total_minutes(self, counts: Array) -> float:
+        """Total duration [min], with set-ups, if each test is run `counts` times, (tests,)."""
         return float(self.minutes @ counts) + self.setup_minutes * np.unique(self.place[counts > 0]).size
 
     def minutes_of_one_more(self, counts: Array) -> Array:
-        """Duration of one more run of each test after `counts` runs [min], (tests,); infinite if it is not allowed."""
+        """Additional duration [min] if a test is run once more than in `counts`, (tests,); infinite if not allowed."""
         more = self.minutes + self.setup_minutes * ~np.isin(self.place, self.place[counts > 0])
         has_run = np.isin(self.alternative, self.alternative[counts > 0])
         barred = has_run & (counts == 0) | (counts >= self.maximum_runs)
-        return np.where(barred | (self.spent(counts) + more > self.maximum_minutes), np.inf, more)
+        return np.where(barred | (self.total_minutes(counts) + more > self.maximum_minutes), np.inf, more)
 
 
 def best_runs(search: PlanSearch, start: Array, minimum_runs: Array) -> Array:
-    """Find the number of runs of each test that minimises the objective of a search within its budget.
+    """Find the number of runs of each test that minimises the objective of a search within the available hours.
 
     Args:
         search: search with the objective and the budget.

@@ -32,14 +32,14 @@ ROWS_PER_CYCLE = 1000
 
 
 class Information(NamedTuple):
-    """Fisher information of alternative choices of tests on k parameters and e departures from the model.
+    """Fisher information of alternative sets of tests on k parameters, and visibility of e departures from the model.
 
     A departure is the change of the residuals due to a missing effect of typical amount, or due to a rival model.
 
     Args:
-        products: inner products of the parameter columns with the columns of parameters and departures, (choices, k,
-            k + e).
-        squares: inner product of the column of each departure with itself, (choices, e).
+        products: inner products of the residuals' derivatives by parameter with these derivatives and with the
+            departures, (choices, k, k + e).
+        squares: sum of squares of each departure over the residuals, (choices, e).
     """
 
     products: Array
@@ -47,11 +47,11 @@ class Information(NamedTuple):
 
     @property
     def parameters(self) -> Array:
-        """Fisher information on relative changes of the k parameters, a matrix per choice of tests, (choices, k, k)."""
+        """Fisher information on relative changes of the k parameters, for each set of tests, (choices, k, k)."""
         return self.products[..., : self.products.shape[-2]]
 
     def noncentralities(self) -> Array:
-        """Chi-square expected in excess of noise after a refit of the model if a departure is true, (choices, e)."""
+        """Expected increase of chi-square by each departure, after a refit of the model to the tests, (choices, e)."""
         cross = self.products[..., self.products.shape[-2] :]
         fitted = np.linalg.solve(self.parameters, cross)
         return np.maximum(self.squares - np.sum(cross * fitted, axis=-2), 0.0)
@@ -59,14 +59,14 @@ class Information(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class ModelInformation:
-    """Fisher information of one run of each candidate test on the k parameters of a model and on e departures from it.
+    """Fisher information of one run of each candidate test on k parameters and e departures from the model.
 
     Args:
-        products: inner products of the first 2 + k columns with all columns, (tests, 2 + k, 2 + k + e). The columns
-            are unit gain error, unit phase error, k parameters, and e departures (missing effects or rival models).
-        squares: inner product of the column of each departure with itself, (tests, e).
-        class_ratios: largest change of the response due to each departure at any point of a test, relative to the
-            accuracy class, (tests, e).
+        products: inner products of the first 2 + k columns with all columns, (tests, 2 + k, 2 + k + e). The columns are
+            unit gain error, unit phase error, k parameters, and e departures (missing effects or rival models).
+        squares: sum of squares of each departure over the residuals of a run, (tests, e).
+        class_ratios: largest change of the response by each departure at any point of a test, divided by the accuracy
+            class of the rig, (tests, e).
         level: standard deviations of the gain [1] and phase [rad] errors that all runs of a test share, the accuracy
             class of the rig, (2,).
         prior: information matrix of the parameters' relative changes before the tests, (k, k).
@@ -81,13 +81,13 @@ class ModelInformation:
     bounded: int = 0
 
     def of_runs(self, counts: Array) -> Information:
-        """Compute the Fisher information that each planned test adds by itself.
+        """Fisher information of the runs of each test by itself, without the tests so far.
 
         Args:
             counts: number of runs of each test, (tests,).
 
         Returns:
-            Information in which choice n is test n alone, without the tests so far.
+            Information with one entry (choice) for each test.
 
         Notes:
             The gain and phase errors that all runs of a test share are eliminated: with their columns U and standard
@@ -101,7 +101,7 @@ class ModelInformation:
         return Information(remaining, self.squares * counts[:, None] - decrease)
 
     def total(self, counts: Array) -> Information:
-        """Fisher information of the prior and of all runs of a set of tests.
+        """Fisher information of the prior and of all runs together, as a single choice.
 
         Args:
             counts: number of runs of each candidate test, (tests,).
@@ -112,7 +112,7 @@ class ModelInformation:
         return Information(products, tests.squares.sum(axis=0, keepdims=True))
 
     def with_one_more(self, counts: Array) -> Information:
-        """Fisher information of the prior and all tests if one test is run once more, one choice for each test.
+        """Fisher information of the prior and all runs if one test is run once more; one choice for each test.
 
         Args:
             counts: number of runs of each test before this run, (tests,).
@@ -236,8 +236,8 @@ class CandidateGrid:
     def effect_columns(self) -> tuple[list[Effect], Array]:
         """Compute the changes of the residuals by effects of the library that the model lacks.
 
-        An effect occurs once for each shape: a choice of its other parameters, such as the frequency of a resonance.
-        Effects of the order or temperature of tests, and effects without a small amount, are left out.
+        An effect occurs once for each choice of its shape parameters, such as the frequency of a resonance. Effects of
+        the order or temperature of tests, and effects that cannot be small, are left out.
 
         Returns:
             The e effects, and the change of the n residuals due to a typical amount of each, (e, n).

@@ -76,6 +76,7 @@ def from_campaign(data: PreparedCampaign, rivals: Sequence[str] | None = None) -
     source = f"the tests of {data.campaign.name}"
 
     def knowledge(fit: FitResult) -> Knowledge:
+        """Knowledge from one fit of the campaign."""
         result = replace(result_of(fit, data.bounds, ()), specimens=data.campaign.specimens)
         plain = replace(from_result(result, noise, source), tests=tuple(_campaign_runs(data)))
         bounded = tuple(name for name in fit.at_bound if name not in plain.names)
@@ -111,7 +112,7 @@ def from_campaign(data: PreparedCampaign, rivals: Sequence[str] | None = None) -
 
 
 def _check_rivals(names: Iterable[str], possible: Container[str]) -> None:
-    """Raise a ModelError if a name is not among the possible effects."""
+    """Raise a ModelError if one of the effects in `names` is not among the `possible` effects."""
     if unknown := [name for name in names if name not in possible]:
         raise ModelError(
             "this is not a rival in these tests",

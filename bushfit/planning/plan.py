@@ -64,7 +64,7 @@ def plan(knowledge: Knowledge, request: PlanRequest) -> Plan:
             hint="plan from the campaign, or for parameters or predictions",
         )
     search = PlanSearch.from_request(knowledge, request)
-    shorter = [search.within(share * request.hours) for share in _SHARES.get(request.aim, ())]
+    shorter = [search.with_hours(share * request.hours) for share in _SHARES.get(request.aim, ())]
     for with_checks in (True, False) if search.goals else (False,):  # without checks only if no other plan reaches
         first = bisect_left(shorter, True, key=lambda search: search.reaches_aim(with_checks=with_checks))
         if first < len(shorter):
@@ -104,19 +104,19 @@ def explain_miss(search: PlanSearch, goal: PlannedQuantity) -> str | None:
     if sentence := search.untested_warning(goal, counts):
         origin = "in the plan" if goal.place in search.request.places else "on offer"
         return f"no test so far or {origin} covers this target: {sentence}"
-    if not goal.met(limit):
+    if not goal.meets_target(limit):
         reached, reason = format_half_width(goal.half_width(limit)), goal.explain_limit(search.knowledge, limit)
         return f"no available test is enough; {UNLIMITED_RUNS} runs of each would reach {reached}: {reason}"
-    if goal.met(covariance(counts)):
+    if goal.meets_target(covariance(counts)):
         return None
     more = add_runs(
         replace(search, goals=[goal]),
         replace(search.budget, maximum_minutes=np.inf),
         counts,
-        enough=lambda runs: goal.met(covariance(runs)) or search.budget.spent(runs) > _LONGEST_MINUTES,
+        enough=lambda runs: goal.meets_target(covariance(runs)) or search.budget.total_minutes(runs) > _LONGEST_MINUTES,
     )
-    hours = number(search.budget.spent(more) / 60.0, 2)
-    if goal.met(covariance(more)):
+    hours = number(search.budget.total_minutes(more) / 60.0, 2)
+    if goal.meets_target(covariance(more)):
         return f"{number(search.budget.maximum_minutes / 60.0, 3)} h are too few; about {hours} h are needed"
     reached = format_half_width(goal.half_width(covariance(more)))
     return f"{hours} h would reach {reached}, and no further run would reduce the error by 0.25 %"
@@ -169,7 +169,7 @@ def explain_free_hours(search: PlanSearch, missed: Sequence[str | None]) -> str 
         Sentence; None if the hours are used.
     """
     request, budget = search.request, search.budget
-    hours, planned = request.hours, budget.spent(search.counts) / 60.0
+    hours, planned = request.hours, budget.total_minutes(search.counts) / 60.0
     free = hours - planned
     if free <= float(budget.minutes.max() + budget.setup_minutes) / 60.0:
         return None

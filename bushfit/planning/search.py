@@ -59,7 +59,7 @@ class PlanSearch:
         predictions: stiffness and loss factor of each direction of the request.
         goals: parameter or prediction of each target of the request.
         budget: durations of the tests, and available hours.
-        penalty: weight in the objective of effects that are detected less well than with the standard programme.
+        penalty: weight in the objective of effects that the plan detects less well than the standard programme.
     """
 
     knowledge: Knowledge
@@ -101,8 +101,8 @@ class PlanSearch:
         goals = [replace(named[name], target=half_width) for name, half_width in request.targets.items()]
         return cls(knowledge, request, tests, effects, models, predictions, goals, Budget.from_tests(tests, request))
 
-    def within(self, hours: float) -> PlanSearch:
-        """Copy of the search for another available time on the rig [h]."""
+    def with_hours(self, hours: float) -> PlanSearch:
+        """Copy of the search with another number of hours available on the rig."""
         return replace(self, budget=replace(self.budget, maximum_minutes=60.0 * hours))
 
     @cached_property
@@ -157,16 +157,16 @@ class PlanSearch:
         runs = list[int]()
         while tests:
             runs.append(tests[len(runs) % len(tests)])
-            if self.budget.spent(self.count_runs(runs)) > self.budget.maximum_minutes:
+            if self.budget.total_minutes(self.count_runs(runs)) > self.budget.maximum_minutes:
                 runs.pop()
                 break
         return sorted(runs, key=lambda test: self.budget.place[test])
 
     @cached_property
     def minimum_noncentrality(self) -> Array:
-        """Noncentrality (expected chi-square) that the standard programme reaches for each effect, (e,).
+        """Expected increase of chi-square by each missing effect in the standard programme, (e,).
 
-        It belongs to a typical amount of the effect; 0 if the programme cannot detect even the largest possible amount.
+        The value is for a typical amount of the effect; 0 if the programme cannot detect the largest possible amount.
         """
         reached = self.models[0].total(self.count_runs(self.standard_runs)).noncentralities()[0]
         amounts = [effect.amount for effect in self.effects]
@@ -176,7 +176,7 @@ class PlanSearch:
 
     @cached_property
     def required_runs(self) -> Array:
-        """Smallest number of runs of each candidate test, (tests,): one test in each untested target direction.
+        """Smallest number of runs of each candidate, (tests,): one run in each direction with a target but no test.
 
         Only a test in a direction determines the error of its stiffness formula. All zero if the runs do not fit into
         the hours.
@@ -190,7 +190,7 @@ class PlanSearch:
                 tested = self.knowledge.tests or required.any()
                 if chosen.any() and (not tested or self.untested_warning(goal, required)):
                     required[int(np.argmin(np.where(chosen, values, np.inf)))] = 1
-        return required if self.budget.spent(required) <= self.budget.maximum_minutes else 0 * required
+        return required if self.budget.total_minutes(required) <= self.budget.maximum_minutes else 0 * required
 
     def count_runs(self, runs: Sequence[int]) -> Array:
         """Number of runs of each test, (tests,), in a sequence of test indices."""
@@ -215,7 +215,7 @@ class PlanSearch:
         if self.request.aim == "rivals":
             return self.nearest_rivals(counts) >= 2.0 * RIVALS_APART
         covariance = self.error_covariance(counts)
-        reached = all(goal.reached(covariance, self.limit_covariance) for goal in self.goals)
+        reached = all(goal.nearly_meets_target(covariance, self.limit_covariance) for goal in self.goals)
         testable = [goal for goal in self.goals if goal.place in self.request.places]
         if not self.goals or not reached or any(self.untested_warning(goal, counts) for goal in testable):
             return False
@@ -303,11 +303,11 @@ class PlanSearch:
         for test in tests:
             runs = counts + one[test]
             while (
-                self.budget.spent(runs) > self.budget.maximum_minutes
+                self.budget.total_minutes(runs) > self.budget.maximum_minutes
                 and (single := (runs == 1) & (self.required_runs == 0)).any()
             ):
                 runs = min((runs - one[dropped] for dropped in np.flatnonzero(single)), key=self.objective)
-            if self.budget.spent(runs) <= self.budget.maximum_minutes:
+            if self.budget.total_minutes(runs) <= self.budget.maximum_minutes:
                 yield runs
 
     def scatter_freedom(self, counts: Array) -> list[int]:
@@ -343,7 +343,7 @@ class PlanSearch:
 
     @cached_property
     def weight(self) -> Array | None:
-        """Matrix W, (k, k), of the objective trace(W C) with the parameters' covariance C; None for rivals."""
+        """Matrix W, (k, k), of the objective trace(W C) with the parameters' covariance C; None for the aim rivals."""
         if self.request.aim == "rivals":
             return None
         if self.request.aim == "targets":
@@ -377,6 +377,10 @@ class PlanSearch:
 
 
 def freedom_per_repeat(test: Test) -> int:
-    """Degrees of freedom that one more repeat of a test adds to the noise estimate; 0 for loops and short sweeps."""
+    """Degrees of freedom that one more run of a test adds to the noise estimated from repeats.
+
+    Returns:
+        Degrees of freedom; 0 for loops and short sweeps.
+    """
     steps = len(test.steps) if isinstance(test, SimulatedSweep) else 0
     return steps - 1 if steps >= FEWEST_STEPS else 0

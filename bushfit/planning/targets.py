@@ -24,7 +24,7 @@ _NEARLY = 1.1
 
 @dataclass(frozen=True, eq=False)
 class PlannedQuantity:
-    """Parameter, or predicted stiffness or loss factor, whose error follows from any covariance of the parameters.
+    """Parameter, or predicted stiffness or loss factor, with what is needed to compute its error for any set of tests.
 
     A prediction has n operating points, a parameter one; the k parameters include the parameters at a bound. All errors
     are relative to the value of the quantity.
@@ -109,11 +109,11 @@ class PlannedQuantity:
         """Relative half width of the widest 95 % interval, from the parameters' covariance, (k, k)."""
         return float(self.half_widths(error_covariance).max())
 
-    def met(self, error_covariance: Array) -> bool:
-        """True if this covariance of the parameters, (k, k), makes all intervals as narrow as the target."""
+    def meets_target(self, error_covariance: Array) -> bool:
+        """True if all 95 % intervals are as narrow as the target, given the covariance of the parameters, (k, k)."""
         return self.half_width(error_covariance) <= self.target * (1.0 + 1e-9)
 
-    def reached(self, error_covariance: Array, limit: Array) -> bool:
+    def nearly_meets_target(self, error_covariance: Array, limit: Array) -> bool:
         """True if tests meet the target, or come nearly as close to it as unlimited tests would.
 
         Args:
@@ -121,7 +121,7 @@ class PlannedQuantity:
             limit: covariance of the parameters with unlimited tests, (k, k).
         """
         nearly = self.half_width(error_covariance) <= _NEARLY * self.half_width(limit)
-        return self.met(error_covariance) or (not self.met(limit) and nearly)
+        return self.meets_target(error_covariance) or (not self.meets_target(limit) and nearly)
 
     def weight(self, limit: Array) -> Array:
         """Compute the weight matrix of the search criterion for the target.
@@ -134,7 +134,7 @@ class PlannedQuantity:
             allows, averaged over points. If unlimited tests miss the target, the allowed variance is slightly above the
             variance with unlimited tests.
         """
-        if self.met(limit):
+        if self.meets_target(limit):
             allowed = np.square(np.maximum(self.target - self.undecided, 0.0) / Z95) - self.model_error**2
         else:
             nearly = np.square(_NEARLY * self.half_widths(limit) / Z95)

@@ -23,8 +23,9 @@ class Band:
 
     Args:
         value, low, high: prediction, and lower and upper end of its 95 % band, (n,) each.
-        root: changes of the quantity due to r independent errors of one standard deviation, (r, n). The standard error
-            is the root of the sum of their squares. r is 0 if the uncertainty is unknown.
+        root: changes of the quantity due to one standard deviation of each of r independent errors, (r, n). The
+            standard error of the quantity is the root of the sum of their squares. r is 0 if the uncertainty is
+            unknown.
     """
 
     value: Array
@@ -43,7 +44,7 @@ class Band:
         return Band(np.log(self.value), low, high, self.root / self.value)
 
     def minus(self, subtrahend: Band) -> Band:
-        """Band of the difference from another quantity, at the same points and with independent errors.
+        """Band of the difference from `subtrahend`, a quantity at the same points with independent errors.
 
         Notes: the distance from the difference to an end of its band is the root sum of squares of the distances in the
         two bands (G. Zou, A. Donner, Stat. Med. 27 (2008) 1693).
@@ -72,7 +73,7 @@ def car_models(model: Model, unresolved: Sequence[str]) -> list[Model]:
 
 
 def alternative_models(result: Result, *, rig: bool) -> Iterator[tuple[Result, Model]]:
-    """Yield the alternatives to a fitted model that the tests do not rule out, with or without the effects of the rig.
+    """Yield the other models that the tests do not rule out, with or without the effects of the rig.
 
     Yields:
         The result with the parameter errors of the alternative and without a model error; and the alternative model.
@@ -114,8 +115,8 @@ class Uncertainty:
 
     Args:
         covariance: covariance of the k uncertain parameters of the model.
-        scale: factor for the parameter errors at each point, (n,): 1; less within the tested range if the result has an
-            error of the model, which replaces parameter errors.
+        scale: factor for the parameter errors at each point, (n,): 1, or less within the tested range if the result has
+            an error of the model, which replaces parameter errors there.
         relative: complex relative changes of the stiffness due to e independent errors of the model, (e, n).
     """
 

@@ -102,7 +102,7 @@ class Comparison:
 
     @cached_property
     def widening(self) -> float:
-        """Factor, at least 1, that turns the pointwise 95 % bands of all contrasts into simultaneous 95 % bands."""
+        """Factor, at least 1, on pointwise 95 % bands, so that all points together are inside in 95 % of cases."""
         return max(float(np.quantile(self.largest_errors, 1.0 - CHANCE)), 1.0)
 
     def widened(self, band: Band) -> Band:
@@ -191,18 +191,17 @@ def compare(
 
 
 def with_model_patterns(result: Result, predictions: Sequence[Prediction]) -> list[Prediction]:
-    """Correlate the error of the model between operating points, as its Gaussian process does.
+    """Replace errors of the model that are equal at all points by errors that vary over frequency and strain.
 
-    In a prediction the error of the real part is one random number for all points, and so is that of the imaginary
-    part. Here each becomes a sum of patterns over frequency and strain (see `gaussian_process.patterns`), independent
-    between directions.
+    The real and the imaginary part each get a sum of random patterns over frequency and strain (see
+    `gaussian_process.patterns`), independent between directions.
 
     Args:
         result: fitted result.
         predictions: predictions of the result, one per direction or specimen.
 
     Returns:
-        Predictions with correlated errors in `stiffness` and `loss_factor`; unchanged without an error of the model.
+        Predictions with these errors in `stiffness` and `loss_factor`; unchanged without an error of the model.
     """
     process, shapes = result.model.unnamed or result.model_error, list[Array]()
     if not process:
@@ -214,7 +213,7 @@ def with_model_patterns(result: Result, predictions: Sequence[Prediction]) -> li
     ends = np.cumsum([prediction.frequency.size for prediction in predictions])[:-1]
 
     def spread(band: Band, shape: Array) -> Band:
-        """Replace the two errors of the model, each equal at all n points, by errors in each of q patterns, (q, n)."""
+        """Replace the two errors of the model, equal at all n points, by the errors of q patterns, `shape` (q, n)."""
         errors = (shape[:, None] * band.root[-2:]).reshape(-1, shape.shape[1])
         return replace(band, root=np.concatenate((band.root[:-2], errors)))
 

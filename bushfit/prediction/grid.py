@@ -35,7 +35,7 @@ _MOST_STEPS = 10
 
 
 def requested_grid(default: tuple[Array, Array], requested: PredictSettings, place: Place) -> tuple[Array, Array]:
-    """Choose the grid of a prediction: requested values, or default values for an axis without a request.
+    """Choose the frequencies and amplitudes of a prediction: those requested, or the default for what is not requested.
 
     Args:
         default: default frequencies [Hz] and zero-to-peak amplitudes [m, rad or 1].
@@ -161,7 +161,8 @@ def measured_levels(sweeps: Sequence[Sweep], axis: Literal["frequency", "amplitu
         axis: "frequency" or "amplitude".
 
     Returns:
-        Values [Hz, m, rad or 1], increasing; at most ten over a range of values that the test did not control.
+        Values [Hz, m, rad or 1], increasing. A quantity that the tests did not hold at levels is represented by at most
+        ten values over its range.
     """
     set_values, free_values = [np.empty(0)], [np.empty(0)]
     levels: dict[float, float] = {}

@@ -19,7 +19,7 @@ from bushfit.prediction.bands import uncertainty
 
 @dataclass(frozen=True)
 class OtherBushings:
-    """Agreement of the tests of one bushing with a model that was fitted to the other bushings.
+    """Misfit between the tests of one bushing and a model that was fitted to the other bushings.
 
     Args:
         bushing: name of the bushing.
@@ -51,7 +51,7 @@ def predict_each_bushing(
         directions: directions, specimens or bushings whose tests to use; see `PreparedCampaign.select_tests`.
 
     Returns:
-        Agreement for each bushing; empty for tests of fewer than two bushings.
+        Misfit of each bushing; empty for tests of fewer than two bushings.
     """
     tests = data.select_tests(directions)
     places = [test.direction for test in tests if isinstance(test.direction, Specimen) and test.direction.bushing]

@@ -119,7 +119,7 @@ def compare_parameters(
 
 
 def exponent_of(name: str, parameter: Parameter) -> str | None:
-    """Name of the parameter that is the exponent in another's unit: "alpha" for m [Pa s^alpha]; None without one."""
+    """Name of the parameter that is an exponent in the unit of `name`: "alpha" for m [Pa s^alpha]; None without one."""
     match = _EXPONENT.search(parameter.unit)
     return match and "".join(name.rpartition(".")[:2]) + match[1]
 

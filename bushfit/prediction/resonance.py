@@ -45,7 +45,7 @@ class PredictedResonance:
         stiffness: complex stiffness of the bushing at each frequency and amplitude [N/m], (n,).
         warnings: sentences on a direction that was not fitted, on frequencies and strains near the peak outside the
             fitted range, and on unresolved effects.
-        if_rigs: response if the unresolved effects belong to the rig, not to the bushing; None without such effects.
+        if_in_rig: response if the unresolved effects belong to the rig, not to the bushing; None without such effects.
     """
 
     place: Place
@@ -56,7 +56,7 @@ class PredictedResonance:
     transmissibility: Array
     stiffness: Array
     warnings: tuple[str, ...] = ()
-    if_rigs: PredictedResonance | None = None
+    if_in_rig: PredictedResonance | None = None
 
     @property
     def peak(self) -> tuple[float, float]:
@@ -110,7 +110,7 @@ def predict_resonance(
         stiffness = stiffness_at(amplitude)
         return PredictedResonance(place, mass, base_acceleration, frequency, amplitude, ratio, stiffness)
 
-    predicted, if_rigs = shaken(bushings), shaken(rig_models[-1]) if rig_models else None
+    predicted, if_in_rig = shaken(bushings), shaken(rig_models[-1]) if rig_models else None
     near = np.abs(predicted.transmissibility) >= min(_NEAR_PEAK, predicted.peak[1])
     subject = f"{place}, resonance of {number(mass, 3)} kg"
     warnings = [
@@ -122,9 +122,9 @@ def predict_resonance(
         (low, smallest), (high, largest) = peaks.min(axis=0), peaks.max(axis=0)
         span = f"{number(low, 4)} to {number(high, 4)} Hz, |T| {number(smallest, 4)} to {number(largest, 4)}"
         warnings += [*result.undecided, f"{subject}: {span}, for all models that agree with the tests"]
-    if if_rigs:
-        peak, ratio = (number(value, 4) for value in if_rigs.peak)
+    if if_in_rig:
+        peak, ratio = (number(value, 4) for value in if_in_rig.peak)
         warnings.append(
             f"{subject}: at {peak} Hz, |T| {ratio}, if {' and '.join(result.unresolved)} belongs to the rig"
         )
-    return replace(predicted, warnings=tuple(warnings), if_rigs=if_rigs)
+    return replace(predicted, warnings=tuple(warnings), if_in_rig=if_in_rig)

@@ -79,7 +79,7 @@ class TimeResponse:
 
     @property
     def shares_beyond(self) -> tuple[float, float]:
-        """Shares of the samples whose strain, and whose strain rate, is larger than in the fitted tests."""
+        """Fractions of the samples whose strain, and whose strain rate, exceeds that of all fitted tests, 0 to 1."""
         strain, rate = self.tested or (np.inf, np.inf)
         return (
             float(np.mean(np.abs(self.strain) > strain * (1.0 + MARGIN))),

@@ -39,7 +39,7 @@ class StaticCurve:
         secant: static stiffness from end to end, (1,) [N/m, N m/rad or Pa].
         rate: rate of the motion [m/s, rad/s or 1/s].
         warnings: sentences on extrapolation, and on alternatives without a law in time.
-        preload: preload from which displacement and force are counted; None unless this direction was tested at several
+        preload: preload at which displacement and force are zero; None unless this direction was tested at several
             preloads.
     """
 

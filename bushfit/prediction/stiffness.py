@@ -55,7 +55,7 @@ class Prediction:
         storage_stiffness, loss_stiffness: K' and K'', in the unit of |K|.
         warnings: sentences on directions, frequencies and strains that were not fitted, on excluded effects of the rig,
             and on unresolved effects.
-        if_rigs: prediction if the unresolved effects belong to the rig, not to the bushing; the bands include it, too.
+        if_in_rig: prediction if the unresolved effects belong to the rig, not to the bushing; the bands include it.
             None without unresolved effects.
         measured: measured complex stiffness at these points, mean of the repeats, in the unit of |K|, (n,); nan at a
             point without a measurement; None without sweeps.
@@ -72,7 +72,7 @@ class Prediction:
     storage_stiffness: Band
     loss_stiffness: Band
     warnings: tuple[str, ...] = ()
-    if_rigs: Prediction | None = None
+    if_in_rig: Prediction | None = None
     measured: Array | None = None
     preload: Preload | None = None
     over: LargeMotion | None = None
@@ -134,7 +134,7 @@ def predict(
     conditions = RubberConditions(temperature, preload=tested_preload(result, direction, preload))
     if over:
         models, untimed = timed_candidates(result, f"{direction}, with the large motion", rig=rig)
-        over.require(direction, frequency)
+        over.check_superposable(direction, frequency)
         point = np.array([over.frequency or frequency.min()]), np.array([abs(over.displacement) + amplitude.max()])
         together = extrapolations(result, direction, *point, temperature, f"{direction}, with the large motion")
     else:
@@ -148,7 +148,7 @@ def predict(
     prediction = replace(
         predictions[0],
         **bands,
-        if_rigs=predictions[2 ** len(result.unresolved) - 1] if result.unresolved and not rig else None,
+        if_in_rig=predictions[2 ** len(result.unresolved) - 1] if result.unresolved and not rig else None,
         measured=None if sweeps is None else measured_stiffness(direction, frequency, amplitude, sweeps),
         preload=conditions.preload,
         over=over,
@@ -195,14 +195,14 @@ def point_warnings(
             f"{place}: without {' and '.join(rig)} the predicted stiffness is {percent}, and the predicted loss factor "
             f"{' to '.join(ends)}, compared with the measured values"
         )
-    if prediction.if_rigs and not np.allclose(prediction.if_rigs.stiffness.value, stiffness, rtol=_SAME):
-        percent = format_deviation(prediction.if_rigs.stiffness.value / stiffness)
+    if prediction.if_in_rig and not np.allclose(prediction.if_in_rig.stiffness.value, stiffness, rtol=_SAME):
+        percent = format_deviation(prediction.if_in_rig.stiffness.value / stiffness)
         names = " and ".join(result.unresolved)
         yield f"{place}: stiffness {percent} if {names} belongs to the rig; the band, low to high, includes both"
 
 
 def tested_preload(result: Result, place: Place, preload: Preload | None) -> Preload | None:
-    """Preload of a prediction, which must be within the preloads of the fitted tests.
+    """Choose the preload of a prediction: the requested one, if it is within the tested range, or the default.
 
     Args:
         result: fitted result.

@@ -58,7 +58,7 @@ class LargeMotion:
         slow = np.sin(2.0 * phase / cycles) if self.frequency else 1.0
         return History.steady(self.displacement * slow + amplitude * np.sin(phase), frequency, cycles)
 
-    def require(self, place: Place, frequency: Array) -> None:
+    def check_superposable(self, place: Place, frequency: Array) -> None:
         """Check that the small harmonic can be superposed on this motion.
 
         Args:
@@ -142,7 +142,10 @@ def correction_factor(
 
 
 def untimed_effects(model: Model) -> list[str]:
-    """Names of a bushing's effects whose force over time cannot be computed; a smooth correction is not listed."""
+    """Names of the bushing's effects in a model for which the force over time cannot be computed.
+
+    A smooth correction is not listed.
+    """
     return model.without(Level.INSTRUMENT, UNNAMED).without_time_law
 
 

@@ -109,7 +109,7 @@ def prediction_table(prediction: Prediction, display: Display | None = None) -> 
     columns |= {name: band[name] for name, band in zip(quantities, bands, strict=True)}
     for band in bands:
         columns |= band
-    if rig := prediction.if_rigs:
+    if rig := prediction.if_in_rig:
         columns |= {f"{name}, {IF_RIGS}": getattr(rig, key).value * scale for name, (key, scale) in quantities.items()}
     if (measured := prediction.measured) is not None:
         columns |= {f"measured {force}": np.abs(measured) * factor, "measured loss factor [-]": loss_factor(measured)}
@@ -163,9 +163,9 @@ def predicted_resonance_table(resonance: PredictedResonance) -> pd.DataFrame:
             **response_columns(resonance.place, resonance.stiffness),
         }
     )
-    if resonance.if_rigs:
-        if_rigs = predicted_resonance_table(resonance.if_rigs).iloc[:, 1:].add_suffix(f", {IF_RIGS}")
-        table = pd.concat([table, if_rigs], axis=1)
+    if resonance.if_in_rig:
+        if_in_rig = predicted_resonance_table(resonance.if_in_rig).iloc[:, 1:].add_suffix(f", {IF_RIGS}")
+        table = pd.concat([table, if_in_rig], axis=1)
     return table
 
 

@@ -65,24 +65,24 @@ def test_what_may_be_the_rigs_is_predicted_both_ways_and_the_bands_span_both(eit
     other = predict(settled, Direction.RADIAL, FREQUENCIES, AMPLITUDES)
     told = predict(replace(either, unresolved=()), Direction.RADIAL, FREQUENCIES, AMPLITUDES)
     np.testing.assert_array_equal(found.stiffness.value, told.stiffness.value)
-    np.testing.assert_array_equal(found.if_rigs.stiffness.value, other.stiffness.value)
+    np.testing.assert_array_equal(found.if_in_rig.stiffness.value, other.stiffness.value)
     assert np.all(other.stiffness.value > 1.05 * told.stiffness.value)
     np.testing.assert_array_equal(found.stiffness.low, told.stiffness.low)
     np.testing.assert_allclose(found.stiffness.high, other.stiffness.high)
-    assert told.if_rigs is None
+    assert told.if_in_rig is None
     table = prediction_table(found)
     rigs = [f"{name}, if it is the rig's" for name in FOUR]
     assert list(table.columns[14:]) == rigs
-    np.testing.assert_allclose(table[rigs[1]], found.if_rigs.loss_factor.value)
+    np.testing.assert_allclose(table[rigs[1]], found.if_in_rig.loss_factor.value)
     said = "\n".join((*found.warnings, *caveats(either)))
     assert "is assigned to the bushing, but these tests cannot distinguish it from rig_compliance" in said
     assert "% if sleeve_compliance belongs to the rig; the band, low to high, includes both" in said
     assert predict(either, Direction.RADIAL, FREQUENCIES, AMPLITUDES, rig=True).warnings == told.warnings
     shaken = predict_resonance(either, Direction.RADIAL, 1.0, 1.0, None)
-    assert shaken.if_rigs.peak[0] > 1.02 * shaken.peak[0]
-    assert f"at {shaken.if_rigs.peak[0]:.4g} Hz" in shaken.warnings[-1]
+    assert shaken.if_in_rig.peak[0] > 1.02 * shaken.peak[0]
+    assert f"at {shaken.if_in_rig.peak[0]:.4g} Hz" in shaken.warnings[-1]
     rigs_too = predicted_resonance_table(shaken)["transmissibility [-], if it is the rig's"]
-    np.testing.assert_allclose(rigs_too, np.abs(shaken.if_rigs.transmissibility))
+    np.testing.assert_allclose(rigs_too, np.abs(shaken.if_in_rig.transmissibility))
 
 
 def swept(frequency: object, amplitude: object, **more: Any) -> Sweep:

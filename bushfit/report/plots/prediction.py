@@ -90,7 +90,7 @@ def prediction_figure(
     sentences = [band[bool(np.any(fine.stiffness.high > fine.stiffness.low))]]
     if any(laid) and rig:
         sentences.append("Thin lines: the model with the effects of the rig, as the points were measured.")
-    if fine.if_rigs:
+    if fine.if_in_rig:
         sentences.append("Double lines: the model if the unresolved effect belongs to the rig; the band includes both.")
     if amplitudes.size > _MOST_LEVELS["frequency"]:
         sentences.append(f"{_MOST_LEVELS['frequency']} of {amplitudes.size} amplitudes are drawn.")
@@ -169,9 +169,9 @@ def draw_prediction(
         bands = [band.ends[:, mask] for band in (prediction.stiffness, prediction.loss_factor)]
         marker = "_" if mask.sum() == 1 else ""  # a single point is a stroke
         pair.draw_bands(x[mask], bands, look, lw=_LINE, marker=marker, ms=14.0)
-        if prediction.if_rigs is not None:
-            pair.plot(x[mask], prediction.if_rigs.complex_stiffness[mask], color=look.color, lw=_DOUBLE)
-            pair.plot(x[mask], prediction.if_rigs.complex_stiffness[mask], color="white", lw=_CORE)
+        if prediction.if_in_rig is not None:
+            pair.plot(x[mask], prediction.if_in_rig.complex_stiffness[mask], color=look.color, lw=_DOUBLE)
+            pair.plot(x[mask], prediction.if_in_rig.complex_stiffness[mask], color="white", lw=_CORE)
         if len(rows) and rig is not None:
             pair.plot(x[mask], rig.complex_stiffness[mask], color=look.color, lw=_THIN)
         if len(rows):
@@ -180,11 +180,11 @@ def draw_prediction(
     for axes, span in zip(panels, spans, strict=True):
         style.widen_span(axes, span)
     extra_lines: dict[str, Line2D | tuple[Line2D, ...]] = {}
-    if (with_rig := bool(measured[chosen].any() and rig)) or prediction.if_rigs:
+    if (with_rig := bool(measured[chosen].any() and rig)) or prediction.if_in_rig:
         extra_lines["bushing"] = Line2D([], [], color=style.INK, lw=_LINE)
     if with_rig:
         extra_lines["with the rig"] = Line2D([], [], color=style.INK, lw=_THIN, marker="o", **style.POINT)
-    if prediction.if_rigs:
+    if prediction.if_in_rig:
         double = ((style.INK, _DOUBLE), ("white", _CORE))
         extra_lines[IF_RIGS] = tuple(Line2D([], [], color=color, lw=width) for color, width in double)
     unit, to_people = display_unit(*(("Hz", 1.0) if fixed == "frequency" else place.display.displacement), levels.min())
