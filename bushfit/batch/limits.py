@@ -105,8 +105,8 @@ Stiffness = Annotated[float, _STIFFNESS, _LIMIT]
 class PointLimits:
     """Operating point to which limits apply.
 
-    As the last base class of a table, this class makes pydantic read the point before the limits, because the unit of
-    the limits depends on the point.
+    If this is the last base class of a table, pydantic reads the point before the limits, whose unit depends on the
+    point.
 
     Args:
         at: operating point, such as "axial 25 Hz 0.1 mm".

@@ -43,7 +43,7 @@ _PATTERN = re.compile(r"[*?\[]")
 
 
 def _check_name(lookup: Callable[[str], Effect], raw: object, _: object) -> object:
-    """Check the name of an effect in a manifest, for pydantic: `lookup` raises an error for an unknown name."""
+    """Validator for pydantic: check the name of an effect, for which `lookup` raises an error if it is unknown."""
     if isinstance(raw, str):
         lookup(raw)
     return raw
@@ -82,7 +82,7 @@ class RowSettings:
     lowpass: Frequency | None = None
 
     def with_defaults(self, defaults: RowSettings) -> RowSettings:
-        """Copy of these settings in which None is replaced by the value in `defaults`; other keys are dropped."""
+        """Copy of these settings in which `defaults` replaces each None; keys of a subclass are dropped."""
         names = [setting.name for setting in fields(RowSettings)]
         chosen = {name: getattr(defaults if getattr(self, name) is None else self, name) for name in names}
         return RowSettings(**chosen)

@@ -87,7 +87,13 @@ PointText = Annotated[Point, converter(lambda raw, _: parse_point(raw) if isinst
 
 @dataclass(frozen=True)
 class PartQuantity:
-    """Quantity that is evaluated for each part of a batch: name, display unit, and factor from SI to this unit."""
+    """Quantity that is evaluated for each part of a batch.
+
+    Args:
+        name: name of the quantity, such as "mu" or "stiffness axial 25 Hz 0.1 mm".
+        unit: display unit.
+        factor: factor from SI to the display unit.
+    """
 
     name: str
     unit: str
@@ -99,7 +105,7 @@ class PartQuantity:
 
     @property
     def tabled(self) -> PartQuantity:
-        """Copy of the quantity in the unit of its table column; for a parameter, the unit of a typical value."""
+        """Copy of the quantity in the unit of its table column, which for a parameter is that of a typical value."""
         return self.displayed(get_parameter(self.name).typical) if is_parameter(self.name) else self
 
     @property

@@ -59,7 +59,7 @@ def parameter_value(place: str, name: str, raw: Any) -> float:
 
 
 def convert_effects(raw: dict[str, Any]) -> dict[str, Any]:
-    """Convert tables of parameter values, one table for each effect, to SI; pydantic checks other entries."""
+    """Convert tables of parameter values by effect to SI, before pydantic checks them; other entries are unchanged."""
     return {
         effect: {key: parameter_value(f"{effect}.{key}", f"{effect}.{key}", value) for key, value in table.items()}
         if isinstance(table, dict)
@@ -69,7 +69,7 @@ def convert_effects(raw: dict[str, Any]) -> dict[str, Any]:
 
 
 def convert_limits(raw: dict[str, Any], keys: Sequence[str]) -> dict[str, Any]:
-    """Convert tables of limits, one table for each parameter, to SI; pydantic checks entries that are not tables.
+    """Convert tables of limits by parameter to SI, before pydantic checks them; other entries are unchanged.
 
     Args:
         raw: tables by parameter name, such as {"mu": {"min": "1 MPa"}}.

@@ -107,7 +107,7 @@ def session(bushing: Bushing | None, tests: Sequence[SessionTest]) -> list[Rubbe
 
 
 def _last_larger(strain: Array, session_time: Array) -> tuple[Array, Array]:
-    """Find, for each point of a session, the last earlier strain amplitude that was clearly larger, by about 15 %.
+    """Find, for each point of a session, the last earlier strain amplitude that was larger by about 15 % or more.
 
     Args:
         strain: strain amplitude of each point, in measured order [1], (n,).

@@ -288,6 +288,7 @@ def _progress(console: Console) -> Iterator[None]:
     tasks, start = dict[str, TaskID](), monotonic()
 
     def update(description: str, done: int | None, total: int, remark: str) -> None:
+        """Show how much of a task is done, in a progress bar with a remark; `done` is None at the end of the task."""
         if done is None:
             bar.remove_task(tasks.pop(description))
         else:

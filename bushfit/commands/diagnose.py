@@ -62,10 +62,10 @@ class DiagnosisOutput:
 
     @property
     def adopt(self) -> str:
-        """Advice with the command that diagnoses the campaign with the named causes adopted, beside those before.
+        """Advice to run the diagnosis again with the named causes adopted, with the command; "" if it is not useful.
 
-        It is "" without such a cause, if the only thing it would add is in the model already and certain (effects of a
-        verdict "named" that are no mistake and have no twin), and if a part of the tests has to be measured again.
+        It is not useful without a named cause, if the named effects are certain and in the model already, or if a part
+        of the tests has to be measured again first.
         """
         if self.diagnosis.next_test.startswith(MEASURE_AGAIN):
             return ""

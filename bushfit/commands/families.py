@@ -58,7 +58,7 @@ def fit_campaign_families(
 
 
 def family_to_use(families: Sequence[FittedFamily], results: Sequence[Result]) -> str:
-    """Name the most probable model family, and the ranges of frequency and strain in which all probable ones agree.
+    """Sentence on the most probable model family, and the ranges in which all probable families agree.
 
     Args:
         families: model families, fitted to the same tests.

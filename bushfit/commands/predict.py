@@ -227,7 +227,7 @@ def requested_preloads(result: Result, place: Place, preloads: Sequence[str]) ->
 
 
 def requested_settings(grid: GridOptions) -> PredictSettings:
-    """Settings of the prediction grid that a user states; None for the default of an axis."""
+    """Convert the grid options of a prediction to settings, with None for directions or axes that use the default."""
     axes: dict[str, Any] = {
         key: tuple(value if isinstance(value, str) else float(value) for value in values)
         for key, values in grid.items()

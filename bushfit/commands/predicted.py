@@ -75,7 +75,7 @@ class PredictionOutput:
         if self.arms:
             document["arms"] = [
                 {
-                    "in_place_of": arms.stands_for,
+                    "in_place_of": arms.replaced_effects,
                     "shear_modulus_Pa": arms.modulus.tolist(),
                     "relaxation_time_s": arms.time.tolist(),
                     "band_Hz": arms.band,

@@ -50,7 +50,7 @@ def command_line(command: str, *words: str) -> str:
 
 
 def option_words(**options: str | bool | Iterable[str] | None) -> list[str]:
-    """Words of options on a command line.
+    """Format options as words of a command line.
 
     Args:
         options: value of each option by its key: a text, several texts, or True for a flag; None to leave it out.

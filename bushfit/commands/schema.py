@@ -20,7 +20,7 @@ from bushfit.errors import unknown_name
 
 @dataclass(frozen=True)
 class Described:
-    """A kind of file that has a JSON Schema.
+    """Kind of file that has a JSON Schema: its names, its type in bushfit, and how the schema treats missing keys.
 
     Args:
         files: names of the files, and commands whose `--json` prints the same content.

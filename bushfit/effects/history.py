@@ -159,7 +159,7 @@ class History:
 
     @property
     def sense(self) -> Array:
-        """Sign of the rate (-1, 0 or 1), (..., n): of the motion imposed by the rig if it differs from this motion."""
+        """Sign of the rate (-1, 0 or 1), (..., n): of the motion that the rig imposes (`driver`) if there is one."""
         leading = self if self.driver is None else self.with_value(self.driver)
         return np.sign(leading.rate)
 

@@ -36,7 +36,7 @@ SEPARATOR = ":"
 
 @dataclass(frozen=True, kw_only=True)
 class Mistake(Effect):
-    """A mistake in the record of a test or of the bushing, such as a wrong unit.
+    """Kind of recording mistake in a test or in the dimensions of the bushing, such as a wrong unit.
 
     `sentence` states the mistake, with a placeholder for the files: "the amplitudes of {files} are peak-to-peak".
 
@@ -157,7 +157,7 @@ class Mistake(Effect):
         )
 
     def in_words(self, test: Loop | Sweep) -> str:
-        """Sentence that states the mistake in a test, with the line of the campaign file that corrects it."""
+        """Sentence that states the mistake in a test, with the line of the campaign file that corrects the mistake."""
         return f"{self.sentence.format(files=file_or_name(test))} (then, in the campaign: {self.correction_line(test)})"
 
 
@@ -229,7 +229,7 @@ MISTAKES: dict[str, Mistake] = {name: _build_mistake(name, entry) for name, entr
 
 
 def labelled(name: str, test: str | None) -> str:
-    """Name of a mistake as in options: `mistake:test`, or `mistake` if `test` is None."""
+    """Name of a mistake as in the option --adopt: `mistake:test`, or `mistake` if `test` is None."""
     return name if test is None else f"{name}{SEPARATOR}{test}"
 
 

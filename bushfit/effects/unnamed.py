@@ -110,12 +110,12 @@ class Unnamed:
 
     @property
     def rms(self) -> float:
-        """Root mean square of the relative correction c at the nodes, with its error s: root of mean(c^2 + s^2)."""
+        """Root mean square of the relative correction c with its standard deviation s, sqrt(mean(c^2 + s^2))."""
         return float(np.sqrt(np.mean(self._at_nodes[0] + self._at_nodes[1])))
 
     @property
     def uncertainty(self) -> float:
-        """Relative uncertainty of the correction: rms of its standard deviations over rms of its values at nodes."""
+        """Relative uncertainty of the correction: rms standard deviation over rms value at the nodes."""
         values, errors = self._at_nodes
         return float(np.sqrt(errors.mean() / max(values.mean(), np.finfo(float).tiny)))
 

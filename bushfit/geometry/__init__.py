@@ -43,7 +43,7 @@ class _TestObject:
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """Names by which an effect can be restricted to this test object: its own, and of its body and direction."""
+        """Names to which an effect that acts here may be restricted: "long radial", "long" (body) and "radial"."""
         return (str(self),)
 
     @property
@@ -228,7 +228,7 @@ class Specimen(_TestObject):
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """Names by which an effect can be restricted to this test object: its own, and of its body and direction."""
+        """Names to which an effect that acts here may be restricted: "long radial", "long" (body) and "radial"."""
         return (self.name, self.body, str(self.axis)) if self.axis else (self.name,)
 
 
@@ -273,10 +273,10 @@ def default_places(bushing: Bushing | None, specimens: Sequence[Specimen]) -> li
 
 
 def shared_labels(places: Iterable[Place]) -> list[str]:
-    """List the names to which a search for missing effects may restrict an effect, without redundant ones.
+    """List the names of directions, specimens and bodies to which a missing effect may be restricted.
 
-    A bushing that was tested in one direction only is redundant with this direction. The first of two bodies is
-    redundant because an effect on it cannot be distinguished from the opposite effect on the second.
+    A name that the tests cannot distinguish from another is left out: a bushing that was tested in one direction only,
+    and the first of two bodies, because an effect on it equals the opposite effect on the second.
 
     Args:
         places: tested directions and specimens.

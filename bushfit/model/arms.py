@@ -51,9 +51,8 @@ class Arms:
         time: relaxation times tau_k [s], (k,).
         band: lowest and highest frequency [Hz] of the approximation.
         error: largest relative error of the complex modulus in the band.
-        stands_for: names of the effects that the arms replace, such as "springpot"; empty if they replace the whole
-            rubber.
-        size: name, in files and reports, of the model parameter that all moduli are proportional to; empty for none.
+        replaced_effects: names of the effects that the arms replace, such as "springpot"; empty for the whole rubber.
+        size: name of the model parameter to which all moduli are proportional, as in files and reports; empty for none.
         conditions: temperature of the rubber; unknown for the reference temperature of the model.
 
     Notes: because all moduli and times are positive, the arms dissipate energy in any motion.
@@ -63,7 +62,7 @@ class Arms:
     time: Array
     band: tuple[float, float]
     error: float
-    stands_for: str = ""
+    replaced_effects: str = ""
     size: str = ""
     conditions: RubberConditions = UNKNOWN
 
@@ -71,7 +70,7 @@ class Arms:
     def sentence(self) -> str:
         """Sentence with the number of arms, the effects that they replace, and their error."""
         count, (low, high) = self.time.size, (number(end, 3) for end in self.band)
-        arms = f"{count} Maxwell arm{'s' * (count > 1)} represent the {self.stands_for}"
+        arms = f"{count} Maxwell arm{'s' * (count > 1)} represent the {self.replaced_effects}"
         return f"{arms}: error at most {number(100.0 * self.error, 2)} % of its modulus from {low} to {high} Hz"
 
 
@@ -159,7 +158,7 @@ def model_arms(
         if model.values[size]:
             modulus = partial(part_modulus, model, size, conditions=conditions)
             arms = fitted_arms(modulus, band, accuracy)
-            fitted.append(replace(arms, stands_for=" and ".join(names), size=size, conditions=conditions))
+            fitted.append(replace(arms, replaced_effects=" and ".join(names), size=size, conditions=conditions))
     return tuple(fitted)
 
 
@@ -173,7 +172,7 @@ def arm_rows(model: Model, arms: Sequence[Arms]) -> list[tuple[str, float, float
     """
     values = values_under(model, arms[0].conditions) if arms else model.values
     at_rest = [("elastic", values["mu"], np.nan)] if "mu" in values else []
-    springs = ((part.stands_for, *pair) for part in arms for pair in zip(part.modulus, part.time, strict=True))
+    springs = ((part.replaced_effects, *pair) for part in arms for pair in zip(part.modulus, part.time, strict=True))
     return at_rest + [(name, float(modulus), float(time)) for name, modulus, time in springs]
 
 
@@ -258,7 +257,7 @@ def _fit(
     unit = np.abs(target).mean()
 
     def parts(x: Array) -> tuple[Array, Array]:
-        """Modulus of each arm relative to the total, and its derivative with respect to ln(time), (n, k) each."""
+        """Modulus of each arm relative to the total, and its derivative by ln(time), (n, k) each."""
         turn = 1j * omega[:, None] * np.exp(x[count:])
         basis = turn / (1.0 + turn)
         # a step that goes too far is held, as `exp` would overflow
@@ -266,10 +265,12 @@ def _fit(
         return arm, arm * (1.0 - basis)
 
     def residual(x: Array) -> Array:
+        """Weighted relative errors of the arms' modulus, real then imaginary parts, (2 n,)."""
         error = root * (parts(x)[0].sum(axis=1) - target / total)
         return np.concatenate((error.real, error.imag))
 
     def slopes(x: Array) -> Array:
+        """Derivatives of `residual` with respect to the logs of moduli and relaxation times, (2 n, 2 k)."""
         both = root[:, None] * np.concatenate(parts(x), axis=1)
         return np.concatenate((both.real, both.imag))
 

@@ -25,8 +25,8 @@ class Covariance:
     Args:
         names: names of the k parameters.
         matrix: covariance matrix, (k, k).
-        spread: changes of the matrix if one of the estimated noise figures rises by its standard error, one (k, k)
-            matrix per figure.
+        spread: changes of the matrix if an estimated noise variance rises by its standard error, one (k, k) matrix per
+            variance.
 
     >>> known = Covariance(("mu", "m"), np.array([[4.0, 3.0], [3.0, 9.0]]))
     >>> known.stderr("m"), known.correlations(), round(known.half_widths["mu"], 2)

@@ -17,7 +17,7 @@ FACTOR_SPREAD = 0.03
 
 
 def factor_spread(result: Result) -> float | None:
-    """Relative standard deviation of the stiffness of bushings about their formula, from priors of their factors.
+    """Relative standard deviation of the stiffness of bushings from the formula, by the priors of their factors.
 
     Returns:
         Root mean square distance from 1 of the stiffness factors that the campaign's priors expect [1]; None if no
@@ -45,6 +45,7 @@ def with_factor(result: Result, places: Sequence[str], spread: float) -> Result:
     names = tuple(f"stiffness_factor.{place}" for place in places)
 
     def with_factors(model: Model) -> Model:
+        """Add the stiffness factors, with the value 1, to a model."""
         effects = (*model.effects, *names)
         return Model.with_defaults(model.bushing, effects, model.values, model.unnamed, model.constraints)
 
@@ -76,6 +77,7 @@ def transfer_compound(result: Result, bushing: Bushing) -> tuple[Result, str]:
     names = [coupon.name for coupon in coupons]
 
     def transfer(model: Model) -> Model:
+        """Model of the other bushing, with the effects of the material."""
         effects = [
             record.name for record in model.records if record.level is Level.MATERIAL or record.corrects in names
         ]

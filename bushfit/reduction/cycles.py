@@ -130,12 +130,12 @@ def stretches(changes: NDArray[np.bool_], fewest: int = 1) -> list[slice]:
 
 
 def resumes_in_phase(gap: float, *, step: float = 1.0) -> bool:
-    """True if a sine resumes in phase after a gap [cycles]: at most three cycles, and a multiple of `step`."""
+    """True if a sine continues in phase after a gap [cycles]: at most three cycles, and a multiple of `step`."""
     return gap < _LONGEST_INTERRUPTION and abs(gap - step * round(gap / step)) < _SAME_PHASE
 
 
 def shifted_difference(time: Floats, motion: Floats, shift: float, rows: slice) -> Floats:
-    """Compute the change of a motion over a given time, to test whether the motion is periodic with this time.
+    """Compute the change of a motion over a given time; it is nearly zero if the motion is periodic with this time.
 
     Args:
         time: time of each row [s], (n,).

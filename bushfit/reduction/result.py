@@ -50,7 +50,7 @@ class Step:
     Args:
         name: name of the history.
         start, end: beginning and end of the used cycles [s].
-        cycles, found: number of whole cycles used, and of the whole step.
+        cycles, found: number of whole cycles used for the operating point, and found in the step.
         rows_per_cycle: mean number of rows in a cycle.
         frequency: fundamental frequency [Hz].
         amplitude: zero-to-peak amplitude of the displacement's fundamental, as reached by the rig [m or rad].

@@ -168,7 +168,7 @@ def parameter_differences_table(comparison: ComparisonFile) -> pd.DataFrame:
     """Table of the differences of parameters, parameters.csv.
 
     Returns:
-        A row per parameter and pair of results.
+        A row per parameter and pair of results: values, difference with its 95 % interval, and probability by chance.
     """
     rows = [
         {
@@ -202,7 +202,7 @@ def families_table(families: Sequence[FamilyEntry]) -> pd.DataFrame:
     """Table of the compared model families, families.csv.
 
     Returns:
-        A row per family.
+        A row per family: name, parameters, reduced chi-square, BIC, held-out error, gain, p-value and probability.
     """
     rows = [
         {

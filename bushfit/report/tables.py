@@ -293,10 +293,10 @@ def sweeps_table(model: Model, data_sets: Sequence[MeasuredSweep]) -> pd.DataFra
 
 
 def condition_columns(data_set: MeasuredSweep) -> dict[str, Any]:
-    """Table columns of a sweep for its stepped quantity and, if stated, temperature, preload, part and error.
+    """Columns of `sweeps_table` on the conditions of a sweep: stepped quantity, temperature, preload, part, error.
 
     Returns:
-        Values by column header: one for all points of the sweep, or (n,).
+        Values by column header: one value for the whole sweep, or one for each of its n points, (n,).
     """
     sweep, conditions = data_set.test, data_set.source.conditions if data_set.source else {}
     columns: dict[str, Any] = {"stepped": sweep.stepped or "neither"}

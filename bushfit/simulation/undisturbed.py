@@ -251,6 +251,7 @@ def _clean_resonance(truth: Model, test: SimulatedResonance, steps_per_cycle: in
     base = test.base_acceleration / (2.0 * np.pi * frequency) ** 2
 
     def closed(amplitude: Array) -> Array:
+        """Complex stiffness by the equation in frequency, at zero-to-peak amplitudes of the mount's deformation [m]."""
         return mount.stiffness(test.direction, frequency, amplitude)
 
     approximate, _ = shaken_response(closed, test.mass, frequency, base)

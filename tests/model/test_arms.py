@@ -50,7 +50,7 @@ def test_arms_keep_within_their_error_and_give_off_no_energy(alpha, decades, acc
 def test_the_springpot_and_the_spring_in_series_are_one_part(paper_model):
     model = paper_model.with_effect("fractional_zener", {"fractional_zener.c": 0.3})
     (part,) = model_arms(model, (1.0, 1000.0), 0.005)
-    assert part.stands_for == "springpot and fractional_zener"
+    assert part.replaced_effects == "springpot and fractional_zener"
     omega = 2.0 * np.pi * np.geomspace(1.0, 1000.0, 50)
     shape = model.stiffness_per_modulus(Direction.AXIAL)
     whole = model.stiffness(Direction.AXIAL, omega / (2.0 * np.pi), 1.0) / shape

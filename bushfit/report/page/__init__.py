@@ -43,7 +43,7 @@ def render_page(template: str, context: dict[str, Any]) -> str:
 
 @cache
 def templates() -> jinja2.Environment:
-    """Make the environment of the templates, which escapes texts.
+    """Create the jinja2 environment from which the HTML pages are rendered, with automatic escaping of texts.
 
     Returns:
         Environment with the filters `number` (significant digits) and `formula`, and the function `format_range`.

@@ -98,7 +98,7 @@ def index_page(batch: BatchFile, folder: Path, base: str = "") -> str:
 
 
 def summarize_warnings(named: Sequence[tuple[str, str]]) -> str:
-    """Sentence on the warnings of one kind: their parts, the first of them, and how many have other numbers.
+    """Summarise warnings that differ only in their numbers: parts, first warning, and the number of other texts.
 
     Args:
         named: name of the part and text of each warning.

@@ -63,11 +63,11 @@ class SweepGroup(NamedTuple):
 
     @property
     def shares_levels(self) -> bool:
-        """True if the curves of this panel differ only in their fixed amplitude or frequency, so that a scale suits."""
+        """True if the curves differ only in a fixed amplitude or frequency, so that a colour bar can name them."""
         return self.palette in ("amplitude", "frequency")
 
     def thinned(self) -> SweepGroup:
-        """Copy of the group of sweeps with at most 24 of its curves, evenly from the first to the last."""
+        """Copy of the group with at most 24 of its curves, evenly chosen from the first to the last."""
         return self._replace(curves=[self.curves[index] for index in spread_indices(len(self.curves), MOST_CURVES)])
 
 
