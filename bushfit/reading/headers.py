@@ -205,11 +205,8 @@ class Vocabulary:
     ) -> None:
         self._stated_units = stated_units
         self._stated = {plain(name): role for role, name in columns.items() if role in names}
-        usual = ((plain(name), role) for role, usual in names.items() if role not in columns for name in usual)
-        self._roles: dict[str, list[str]] = {name: [role] for name, role in self._stated.items()}
-        for name, role in usual:
-            if name not in self._stated and role not in self._roles.setdefault(name, []):
-                self._roles[name].append(role)
+        usual = _roles_by_name(tuple((role, *usual) for role, usual in names.items() if role not in columns))
+        self._roles = {**usual, **{name: [role] for name, role in self._stated.items()}}
         self._known: dict[tuple[str, str | None], Heading | None] = {}
         self._names = {role: usual[0] for role, usual in names.items()} | dict(columns)
 
@@ -292,6 +289,16 @@ class Vocabulary:
                 yield word
             elif _SYMBOL.fullmatch(symbol) and _UNLIKE_SYMBOL.isdisjoint(_folded(name).split()):
                 yield from [symbol] * any(units.is_compatible(unit or "", si) for si in ("N/m", "N*m/rad", "Pa"))
+
+
+@lru_cache(maxsize=16)
+def _roles_by_name(names: tuple[tuple[str, ...], ...]) -> Mapping[str, list[str]]:
+    """Roles of each usual column name in plain letters; each entry of `names` is a role, then its names."""
+    roles: dict[str, list[str]] = {}
+    for role, *usual in names:
+        for name in dict.fromkeys(map(plain, usual)):
+            roles.setdefault(name, []).append(role)
+    return roles
 
 
 def fits(word: str, role: str, unit: str | None) -> bool:
