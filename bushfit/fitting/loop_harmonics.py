@@ -111,19 +111,20 @@ def loop_harmonics(loop: Loop, frequency: float, cycles: float, *, from_rest: bo
     order = resolved_order(loop.time.size / max(cycles, 1.0), _MOST_HARMONICS)
     columns = basis(phase, order)
     grid = np.arange(GRID + 1) / GRID
+    cycle = basis(grid, order)
     recorded = {"displacement": loop.displacement, "force": loop.force}
     values = np.column_stack([column[chosen] for column in recorded.values()])
     transient = (1.0 if cycles >= 2.0 else np.inf) if from_rest else 0.0
-    settled = phase >= transient
+    settled = int(np.searchsorted(phase, transient)) if phase[-1] >= transient else 0
     solution, inliers, outliers = np.empty((columns.shape[1], 2)), np.zeros(values.shape, dtype=bool), {}
     for i, (name, column) in enumerate(recorded.items()):
-        used = settled if name == "force" and settled.any() else np.full(phase.size, True)
+        used = slice(settled if name == "force" else 0, None)
         solution[:, i], inliers[used, i] = _fit_without_outliers(columns[used], values[used, i])
         outliers[name] = _NO_OUTLIERS
         if column.size <= _MOST_ROWS_CHECKED or not inliers[used, i].all():
             residual = (values[:, i] - columns @ solution[:, i])[used]
             turn = (loop.time - loop.time[0]) * frequency
-            distance = column - np.interp(turn % 1.0, grid, basis(grid, order) @ solution[:, i])
+            distance = column - np.interp(turn % 1.0, grid, cycle @ solution[:, i])
             if from_rest and name == "force":
                 first = turn < transient
                 distance[first] -= median_filter(distance[first], NEIGHBOURS, mode="nearest")

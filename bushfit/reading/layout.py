@@ -369,7 +369,7 @@ def _layout(
     numbered = bool(contents) and all(
         _NUMBERED.match(next(filter(None, split(content, delimiter)), "")) for content in contents
     )
-    levels = stated_once(headers, [split(content, delimiter) for content in contents], vocabulary)
+    levels = stated_once(headers, (split(content, delimiter) for content in contents), vocabulary)
     names = ", ".join(f'"{headers[index]}"' for index in sorted(levels))
     notes = (f"{names}: an empty cell has the value of the cell above",) if levels else ()
     layout = Layout(delimiter, tuple(headers), number, tuple(row), units_line, notes=notes, levels=levels)

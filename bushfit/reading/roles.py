@@ -1,6 +1,6 @@
 """Roles of columns: names and SI units for each kind of motion, and pairs that determine a complex stiffness."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from bushfit.geometry import STRAINING, Motion
 from bushfit.reading.headers import STRAINING_COLUMNS, SWEEP_COLUMNS, WORDS, Vocabulary
@@ -46,7 +46,7 @@ def si_unit(role: str, motion: Motion) -> str:
     return str(getattr(motion, unit, unit))
 
 
-def stated_once(headers: Sequence[str], rows: Sequence[Sequence[str]], vocabulary: Vocabulary) -> frozenset[int]:
+def stated_once(headers: Sequence[str], rows: Iterable[Sequence[str]], vocabulary: Vocabulary) -> frozenset[int]:
     """Indices of columns of a sweep that are filled only in the first of several rows, as an amplitude may be.
 
     Args:
@@ -55,6 +55,9 @@ def stated_once(headers: Sequence[str], rows: Sequence[Sequence[str]], vocabular
         vocabulary: known column names.
     """
     roles = [heading.role if header and (heading := vocabulary.heading(header)) else "" for header in headers]
+    columns = [index for index, role in enumerate(roles) if role in _LEVELS]
+    if not columns or _OF_POINTS.isdisjoint(roles):
+        return frozenset()
     points = [row for row in rows if any(cell and role in _OF_POINTS for cell, role in zip(row, roles, strict=False))]
-    columns = [index for index, role in enumerate(roles) if points and role in _LEVELS]
-    return frozenset(n for n in columns if 2 * sum(len(row) > n and row[n] != "" for row in points) <= len(points))
+    filled = {n: sum(len(row) > n and row[n] != "" for row in points) for n in columns}
+    return frozenset(n for n in columns if points and 2 * filled[n] <= len(points))
