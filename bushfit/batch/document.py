@@ -76,7 +76,7 @@ class RowFile:
         quantities: parameters, NRMSE, reduced chi-square, stiffness and loss factor at the points, by name.
         measured: stiffness and loss factor as measured at the points, where known.
         at_bound: parameters whose fitted value is at a bound, with the bound: min or max.
-        curve: |K| [SI] of the first sweep at its middle level, by operating point.
+        curve: |K| [SI] along the middle run of the first sweep, by operating point.
     """
 
     schema: Literal["bushfit/row/3"] = ROW_SCHEMA

@@ -125,7 +125,11 @@ def _new_noise(before: SweepNoise, shortened: Sequence[_ShortSweep], rig: RigSet
 
 
 def _shorten_sweep(data_set: MeasuredSweep) -> _ShortSweep | None:
-    """Average neighbouring points of long runs, and select some of very many levels; None for a short sweep."""
+    """Average neighbouring points of long runs, and select some of very many constant amplitudes or frequencies.
+
+    Returns:
+        The shortened sweep; None if the sweep is short enough.
+    """
     sweep, rows, sentence = data_set.test, data_set.order[data_set.weights > 0.0], ""
     levels = np.unique(sweep.held_value[rows])
     if levels.size > _MOST_LEVELS:

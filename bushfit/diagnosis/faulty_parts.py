@@ -226,7 +226,7 @@ def find_faulty_parts(fit: FitResult) -> list[FaultyPart]:
 
 
 def _level_label(sweep: MeasuredSweep, point: int) -> str:
-    """Text that names the level of a point of a sweep, given by the index of the point."""
+    """Name of the level (constant amplitude or frequency) to which a point of a sweep, given by its index, belongs."""
     if sweep.test.stepped == "frequency":
         return f"the {sweep.direction} level {shown_amplitude(sweep.direction, sweep.amplitude[point])}"
     if sweep.test.stepped == "amplitude":

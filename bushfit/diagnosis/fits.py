@@ -159,7 +159,7 @@ def result_of(
     """
 
     def with_levels(errors: LevelErrors) -> FitResult:
-        """Repeat the fit with a further error, added to the noise, that all runs of a level have in common."""
+        """Repeat the fit with a further error that all runs at one amplitude or frequency (a level) have in common."""
         tests = with_level_errors(fit.problem.tests, errors.error, errors.freedom)
         return Descent.start(replace(fit.problem, model=fit.model, tests=tests)).run(EVALUATIONS).solution
 

@@ -108,7 +108,7 @@ def block_gains(batch: Batch, projections: Array, gram: Array) -> tuple[Array, A
 
 
 def average(groups: Array, log_evidence: Array, changes: Array) -> list[GroupEvidence]:
-    """Average the evidence of each group over noise cases, blocks and prior sizes of the amounts.
+    """Average the evidence of each explanation (group) over sizes of rig errors, its alternatives and amounts.
 
     Args:
         groups: index of the group of each block, ascending, (blocks,).

@@ -68,12 +68,12 @@ class Hypothesis:
 
     @property
     def claim(self) -> Claim | None:
-        """Mistake in the record; None without a mistake."""
+        """Recording mistake that this hypothesis assumes; None without one."""
         return self.state.tests.claim
 
     @property
     def unnamed(self) -> str:
-        """Name of the smooth curve or compound deviation that stands for an unknown effect; "" without one."""
+        """Name of the smooth curve, or smooth deviation of the rubber, for an unknown effect; "" without one."""
         is_curve = self.last is not None and self.last.kind == "unnamed"
         return self.last.name if is_curve and self.last else COMPOUND * self.compound_deviates
 
@@ -102,7 +102,8 @@ class SearchState:
 
     Args:
         tests: tests with their record, as read or corrected.
-        fit: fit of the model with the added effects; faults and a deviation of the compound may be errors in it.
+        fit: fit of the model with the added effects; errors of faulty tests and of a deviating rubber may be fitted,
+            too.
         bare: this fit with residuals in units of the scatter from point to point, without errors that points share.
         log_prior: natural log of the prior probability of the set of explanations, and of the prior density of the
             effects' coordinates with the factor of Laplace's method.
@@ -153,7 +154,7 @@ class SearchState:
 
     @cached_property
     def plain(self) -> FitResult:
-        """The fit with residuals in units of noise, without faults and a deviation of the compound as errors."""
+        """The fit with residuals in units of noise, without errors of faulty tests and of a deviating rubber."""
         return self.fit.reevaluate(self.fit.model, self.fit.data_sets) if self.fit.problem.shared_error else self.fit
 
     @cached_property

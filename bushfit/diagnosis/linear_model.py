@@ -123,7 +123,7 @@ class LinearModel:
         """Project the parameters and the rubber's deviation out of the residuals.
 
         Args:
-            cases: indices of c noise cases, (c,).
+            cases: indices of c noise cases (assumed sizes of the errors of rig and rubber), (c,).
 
         Returns:
             For each case, the log evidence without a further explanation, and what is needed to add explanations.
@@ -162,7 +162,8 @@ class LinearModel:
 
         Args:
             sets: the explanations.
-            cases: indices of the noise cases to average over; None for all cases.
+            cases: indices of the noise cases (assumed sizes of the errors of rig and rubber) to average over; None for
+                all.
 
         Returns:
             Evidence of each group of the first set, then of the second, and so on.
@@ -186,7 +187,7 @@ class LinearModel:
     def evidence(self) -> GroupEvidence:
         """Evidence of the tests without a further explanation, with rig errors within the stated accuracy.
 
-        With a deviation of the compound, `size` and `likeliest` are those of the deviation, relative to |K|.
+        If the rubber may deviate from the model, `size` and `likeliest` are those of the deviation, relative to |K|.
         """
         (base, _, amounts), deviation, with_compound = self.over_cases, self.rig.deviation[self.cases], None
         if self.compound and (deviates := deviation > 0.0).any():
@@ -207,7 +208,7 @@ class LinearModel:
         return float(np.logaddexp.reduce(self.over_cases[0][wide[self.cases]]))
 
     def likely_cases(self, curves: GroupSet | None, far: float) -> Array:
-        """Select the noise cases (assumed sizes of rig errors and of the compound's deviation) with a high evidence.
+        """Select the noise cases (assumed sizes of the errors of rig and rubber) with a high evidence.
 
         Args:
             curves: smooth curves, one of which may explain a gap; None without any.
@@ -234,7 +235,8 @@ class LinearModel:
         """Probability that tests of a complete model would have a larger misfit r^T P r than these tests.
 
         Args:
-            compound_deviates: True to average over noise cases with a deviation of the compound; False without one.
+            compound_deviates: True to average over noise cases (sizes of the rig's errors) with a smooth deviation of
+                the rubber; False over those without.
 
         Notes: a posterior predictive check (Gelman, Meng and Stern, 1996), averaged over noise cases by probability. r
         are the whitened residuals, and P projects out the parameters.
@@ -302,7 +304,7 @@ def _scale_information(grams: Array, rows: Array, precision: Array) -> tuple[Arr
     """Scale the information matrix of k parameters so that its diagonal is nearly 1, and make it invertible.
 
     Args:
-        grams: information matrix in each noise case, (cases, k, k).
+        grams: information matrix for each assumed size of the rig's errors, (cases, k, k).
         rows: derivatives of the residuals with respect to the parameters, (k, n).
         precision: prior precision (inverse variance) of each parameter, (k,).
 

@@ -71,7 +71,7 @@ class LineMisfit:
 
     @property
     def step(self) -> Array:
-        """Frequency [Hz] or amplitude [m or rad] of each point of the line, whichever changes along it, (n,)."""
+        """Stepped quantity at each point, (n,): frequency [Hz] at a constant amplitude, else amplitude [m or rad]."""
         return self.amplitude if self.stepped == "amplitude" else self.frequency
 
     @property

@@ -292,8 +292,9 @@ class _Grid:
     Args:
         measure: unit of the added stiffness.
         linear: linearised model without the added stiffness.
-        groups: residual columns for each pair of powers: a unit of added stiffness in phase, and one in quadrature.
-        cases: indices of the noise cases to average over.
+        groups: changes of the residuals for each pair of powers, by a unit of added stiffness in phase and one in
+            quadrature.
+        cases: indices of the noise cases (assumed sizes of the rig's errors) to average over.
         powers: powers of frequency and amplitude, (g, 2).
         step: spacing of the grid along each axis, (2,); 0 along an axis on which the tests do not differ.
     """
@@ -338,7 +339,7 @@ def _settled_grid(
         fitted: the fitted model and the tests.
         term: complex stiffness that is added to the model, with its unit.
         rig: errors of the rig.
-        cases: indices of the noise cases to average over.
+        cases: indices of the noise cases (assumed sizes of the rig's errors) to average over.
         model: model at its starting parameters.
         bounds: limits of parameters inside their general limits.
 

@@ -55,7 +55,7 @@ def proposals(fit: FitResult, excluded: Collection[str], fixed: Sequence[str]) -
 
     Args:
         fit: the fitted model and the tests.
-        excluded: names of effects not to consider, with their twins.
+        excluded: names of effects not to consider, with effects of the same response (twins).
         fixed: names of parameters that are not fitted.
 
     Returns:
@@ -130,7 +130,7 @@ def missing_effects(model: Model, places: Collection[str], excluded: Collection[
     Args:
         model: the model.
         places: names of directions, specimens and bushings tested, see `geometry.shared_labels`.
-        excluded: names of effects not to consider, with their twins.
+        excluded: names of effects not to consider, with effects of the same response (twins).
 
     Returns:
         Effects. Of twins (an effect of the bushing and one of the rig with the same response), only that of the

@@ -187,8 +187,8 @@ class Diagnosis:
         next_test: measurement that would decide between explanations or confirm the verdict; "" without one.
         candidates: all effects and mistakes considered, the highest score first.
         before: starting model, refitted to all tests.
-        after: model with the added effects; for a mistake in the record, fitted to the corrected tests.
-        result: model to use, with its uncertainty: `after`, or `before` for a mistake in the record.
+        after: model with the added effects; for a recording mistake, fitted to the corrected tests.
+        result: model to use, with its uncertainty: `after`, or `before` for a recording mistake.
         notes: warnings as sentences.
         description: power law of a gap that no known effect explains; None without such a gap or law.
         odds: reported explanations with their probabilities.
@@ -329,7 +329,7 @@ def format_odds(document: Mapping[str, Any]) -> list[str]:
 
 
 def level_of(name: str) -> str:
-    """Level of an effect (material, component, instrument) or mistake (record); "unresolved" if it has a twin."""
+    """Level of an effect (material, component, instrument) or mistake (record); "unresolved" if perhaps of the rig."""
     candidate = get_candidate(name)
     return "unresolved" if candidate.twins or name == UNNAMED else str(candidate.level)
 

@@ -57,7 +57,7 @@ class RecordedTests:
 
         Args:
             base: fit of the starting model to the tests, as recorded or with a mistake corrected.
-            rig: accuracy class of the rig.
+            rig: accuracy class of the rig: its stated gain and phase errors.
             log_prior: natural log of the prior probability that this record is right and nothing is missing.
             claim: mistake that is corrected; None for the tests as recorded.
             change: largest relative change of a recorded quantity in the correction; 0 for the tests as recorded.

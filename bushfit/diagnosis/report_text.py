@@ -141,7 +141,7 @@ class DiagnosisWriter:
         """Fit the starting model with the effects of an explanation that are certain.
 
         Args:
-            first: the explanation. If it also contains a deviation of the compound, the amounts of the effects are
+            first: the explanation. If it also contains a smooth deviation of the rubber, the amounts of the effects are
                 fixed at their posterior means, because a fit without the deviation would distort them.
 
         Returns:

@@ -46,12 +46,12 @@ class NoiseCase:
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """Rows of the residuals that share errors of the rig with each other and with no other rows: a level, or a loop.
+    """Rows of the residuals that share errors of the rig with each other only: a loop, or a level of a sweep.
 
     Args:
         rows: indices of the rows in the residual vector, (n,).
-        columns: change of the whitened residuals due to each of w errors at the size of the rig's accuracy class, (w,
-            n).
+        columns: change of the whitened residuals due to each of w errors, at the gain and phase error that [rig] states
+            for the rig (its accuracy class), (w, n).
         kinds: kind of each error (run, level, drift or loop), (w,).
         scatters: True for points of sweeps, whose scatter differs between noise cases; False for loops.
     """
@@ -178,7 +178,7 @@ def rig_errors(fit: FitResult, rig: RigSettings) -> RigErrors:
 
 
 def noise_cases(fit: FitResult) -> list[NoiseCase]:
-    """List the assumptions on the sizes of the rig's errors and of the compound's deviation.
+    """List the assumptions on the sizes of the rig's errors and of the rubber's smooth deviation from the model's laws.
 
     The point-to-point scatter has several sizes if it was estimated from few repeats.
 
@@ -235,14 +235,15 @@ def error_blocks(fit: FitResult, rig: RigSettings) -> Iterator[Block]:
 
 
 def _shared_errors(count: int, runs: Sequence[Array]) -> tuple[Array, Array]:
-    """Errors shared by the n points of a level, at unit size: of the level, of each run, and drift along each run.
+    """Errors that the points of a level (one constant amplitude or frequency) share, at unit size.
 
     Args:
         count: number n of points.
         runs: indices of the points of each run.
 
     Returns:
-        Value of each of the w errors at the points, (w, n), and the kind of each error, (w,).
+        Value of each of w errors (of the level, of each run, and drift along each run) at the points, (w, n), and the
+        kind of each error, (w,).
     """
     columns, kinds = [np.ones(count)], [_LEVEL]
     for run in runs:

@@ -117,7 +117,7 @@ def fast_relaxation(fit: FitResult) -> Array:
 
 
 def _compound_correlation(points: Array, nodes: Array) -> Array:
-    """Correlation of the compound's deviation between n points, (n, 2), and m nodes, (m, 2), as a matrix (n, m).
+    """Correlation of the rubber's smooth deviation between n points, (n, 2), and m nodes, (m, 2), as a matrix (n, m).
 
     The columns are ln frequency and ln strain in units of the correlation lengths.
 

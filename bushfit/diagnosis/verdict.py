@@ -57,12 +57,12 @@ class Composition:
 
     @property
     def nameless(self) -> tuple[str, ...]:
-        """Texts for the parts that are not known effects: level errors, and unnamed smooth curves."""
+        """Texts for the parts without a known effect: errors at one amplitude or frequency, and smooth curves."""
         return (*([LEVELS] if self.best.levels else []), *([NAMELESS] if self.unnamed else []))
 
     @property
     def causes(self) -> tuple[str, ...]:
-        """Names of the mistake in the record and of the effects of the explanation."""
+        """Names of the recording mistake and of the effects of the explanation."""
         return (*([str(self.best.claim.mistake.name)] if self.best.claim else []), *self.names)
 
     @property
@@ -196,7 +196,7 @@ def _parts_of(hypothesis: Hypothesis) -> frozenset[_Part]:
 
 
 def compose(pairs: Sequence[tuple[Hypothesis, float]]) -> list[Composition]:
-    """Merge hypotheses with the same parts, with or without a deviation of the compound, into explanations to report.
+    """Merge hypotheses with the same parts, with or without a smooth deviation of the rubber, into explanations.
 
     A set of parts that is less probable than a subset of it is merged with the subset; an effect that is a limiting
     case of another is merged with that effect. Faulty parts of the same kinds are merged.

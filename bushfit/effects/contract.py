@@ -303,7 +303,7 @@ class Layer(Effect):
     force: Callable[[Values, ForceBelow, History, Setting], Array] | None = None
 
     def __post_init__(self) -> None:
-        """Raise a TypeError for a layer without a law."""
+        """Raise a TypeError for a layer without functions of the stiffness and the force."""
         if not (self.response_factor or (self.stiffness and self.force)):
             raise TypeError("a layer needs the functions stiffness and force, or response_factor")
 

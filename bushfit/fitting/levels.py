@@ -76,7 +76,7 @@ def level_errors(
     added, most_added = np.zeros(2), np.maximum(np.square(maximum) - counted, 0.0)
 
     def likelihood(added: Array) -> tuple[Array, Array, float]:
-        """Restricted likelihood of the residuals if the levels have additional gain and phase errors.
+        """Restricted likelihood of the residuals if all runs of a level share additional gain and phase errors.
 
         Args:
             added: additional variance of the gain, and of the phase, (2,).
@@ -110,7 +110,7 @@ def level_errors(
 
 
 def level_error_columns(sweep: MeasuredSweep) -> Array:
-    """Derivatives of a sweep's whitened residuals with respect to the gain and phase error of each of its levels.
+    """Derivatives of a sweep's whitened residuals with respect to a gain and a phase error of each level.
 
     Returns:
         Derivatives, (2 levels, n): gain [1] and phase [rad] of the first level, then of the next.

@@ -80,7 +80,7 @@ def with_excess_errors(
     Args:
         plain_fit: least-squares fit with the noise alone.
         bounds: limits of parameters [SI], inside their default limits.
-        rig: accuracy class of the rig.
+        rig: accuracy class of the rig (stated gain and phase errors).
         refit: function that repeats the fit with errors of levels in the noise.
 
     Returns:
@@ -112,7 +112,7 @@ def with_model_error(
     Args:
         plain_fit: least-squares fit with the noise alone.
         bounds: limits of parameters [SI], inside their default limits.
-        rig: accuracy class of the rig, whose errors may explain a misfit.
+        rig: accuracy class of the rig (stated gain and phase errors), which may explain a misfit.
         certain: True if it is known already that the tests differ from the model by more than noise.
 
     Returns:
@@ -268,7 +268,7 @@ def log_likelihood(solution: FitResult, prior_precision: Mapping[str, float]) ->
 
 
 def _exceeds_noise(solution: FitResult, rig: RigSettings) -> bool:
-    """True if chi-square, of all tests or of one, is too large for noise and errors of the rig's accuracy class."""
+    """True if chi-square, of all tests or of one, is too large for the noise and for rig errors of the stated size."""
     squares, counts = [], [test.residual_count for test in solution.problem.tests]
     for test, rows in zip(solution.problem.tests, residual_slices(solution.problem.tests), strict=True):
         whitened = SharedErrors.from_columns(_errors_of_class(test, rig)).whiten(solution.residual[rows])
@@ -301,7 +301,7 @@ def _with_unseen_level_errors(tests: Sequence[MeasuredTest], rig: RigSettings) -
     """
 
     def with_level(noise: SweepNoise) -> SweepNoise:
-        """Add errors of levels to a noise that has none; its size is that of the rig's accuracy class."""
+        """Raise the errors of levels in a noise from repeats to the size that [rig] states or bushfit assumes."""
         if noise.origin != "repeats":
             return noise
         gain, phase = np.maximum(class_errors(rig, UNSTATED_LEVEL), noise.level).tolist()
@@ -313,8 +313,8 @@ def _with_unseen_level_errors(tests: Sequence[MeasuredTest], rig: RigSettings) -
 def _errors_of_class(test: MeasuredTest, rig: RigSettings) -> Array:
     """Changes of a test's n whitened residuals due to one standard deviation of each of w rig errors, (w, n).
 
-    The errors are the gain error of a loop, or the gain and phase errors of each level of a sweep. The estimated noise
-    does not contain them; their size is the accuracy class of the rig.
+    The errors are the gain error of a loop, or a gain and a phase error at each constant amplitude or frequency of a
+    sweep. The estimated noise does not contain them; their size is the one that [rig] states or bushfit assumes.
     """
     if isinstance(test, MeasuredLoop):
         gain = test.gain_error * test.gain_and_offset()[:1]

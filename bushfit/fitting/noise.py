@@ -118,7 +118,7 @@ def sweep_noise(sweeps: Sequence[Sweep], rig: RigSettings = UNSTATED) -> SweepNo
     at_levels = [(sweep, log_stiffness_at_nominal(sweep)) for sweep in sweeps]
 
     def of_lines(without: Collection[float]) -> dict[LineKey, LineNoise]:
-        """Noise of every line of every sweep, without the given frequencies or amplitudes."""
+        """Noise of every run at one constant value, by sweep and value, without the points at the given steps."""
         return {
             (sweep.name, float(held_value)): line_noise(sweep, log_stiffness, held_value, without)
             for sweep, log_stiffness in at_levels

@@ -139,7 +139,7 @@ def _with_contradictions(tests: Sequence[_Kind], conditions: Sequence[Array]) ->
 
 
 def with_level_errors(tests: Sequence[MeasuredTest], error: tuple[float, float], freedom: int) -> list[MeasuredTest]:
-    """Return tests with new sizes of the gain and phase errors that all runs of a level of a sweep share.
+    """Return tests with new sizes of the gain and phase errors that all runs at one amplitude or frequency share.
 
     Args:
         tests: loops, which are unchanged, and sweeps.

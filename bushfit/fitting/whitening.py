@@ -54,7 +54,7 @@ class Whitening:
 
         Args:
             deviation: deviations, complex (n,).
-            shared: True to subtract the likeliest shared error of each block.
+            shared: True to subtract the likeliest error that the points of each run share.
 
         Returns:
             Gain and phase of each point in units of the scatter, (2, n).

@@ -95,12 +95,12 @@ class Model:
 
     @cached_property
     def structure(self) -> Structure:
-        """Effects of the model sorted by kind (branches, modifiers, layers), with their parameters; cached."""
+        """Effects of the model by kind: branches of the rubber, modifiers of parameters, layers around the rubber."""
         return structure_of(self.effects)
 
     @property
     def records(self) -> tuple[Effect, ...]:
-        """Effects of the model from the rubber outward: by level, and within a level in the order of the library."""
+        """Effects of the model from the rubber outward: material, component, then instrument, each in library order."""
         return self.structure.records
 
     @property

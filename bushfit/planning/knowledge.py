@@ -50,9 +50,9 @@ def from_result(result: Result, noise: Noise | None = None, source: str = "") ->
 def from_campaign(data: PreparedCampaign, rivals: Sequence[str] | None = None) -> Knowledge:
     """Fit the tests of a campaign as the starting point of a plan; with rivals, one fit for each rival effect.
 
-    The fits treat the errors of the accuracy class of the rig as noise, whether [rig] states them or not, as in the
-    planned tests. With rivals, the model also has the effects that a diagnosis names, and the first effect of each
-    other set that the diagnosis cannot separate.
+    The fits treat gain and phase errors of the rig, as [rig] states them or as assumed, as noise, as in the planned
+    tests. With rivals, the model also has the effects that a diagnosis names, and the first effect of each other set
+    that the diagnosis cannot separate.
 
     Args:
         data: tests of the campaign.

@@ -343,7 +343,7 @@ class PlanSearch:
 
     @cached_property
     def weight(self) -> Array | None:
-        """Matrix W, (k, k), of the objective trace(W C) with the parameters' covariance C; None for the aim rivals."""
+        """Matrix W, (k, k), of the objective trace(W C) with the parameters' covariance C; None to separate rivals."""
         if self.request.aim == "rivals":
             return None
         if self.request.aim == "targets":
