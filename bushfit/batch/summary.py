@@ -116,9 +116,9 @@ class BatchResult:
 
     @cached_property
     def curves(self) -> dict[str, Array]:
-        """Measured |K| of the parts by table column, (n,), NaN where not measured.
+        """Columns of measured |K| for the batch table, by header: a value for each of the n parts, NaN if not measured.
 
-        The columns are the operating points of the measured curve that most parts share.
+        There is a column for each point of the measured stiffness curve that most parts have in common.
         """
         shared, curves = Counter(tuple(record.curve) for record in self.records if record.curve), dict[str, Array]()
         points, sharing = max(shared.items(), key=lambda item: item[1], default=((), 0))

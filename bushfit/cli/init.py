@@ -314,11 +314,11 @@ class Questions:
                 answers |= self.ask((new or wrong)[0], bare_error)
 
     def ask(self, key: _Key, error: BushfitError) -> dict[_Key, Any]:
-        """Ask for the value of an option that an error names.
+        """Ask at the terminal for the value of an option that an error names; earlier answers are the default.
 
         Args:
-            key: key of the option and, for the header or unit of a column, the role of the column, such as ("column",
-                "force"); ("rate", "") for other options.
+            key: name of the option, and the role of the column if the option is for a column: ("column", "force"), else
+                "": ("rate", "").
             error: error to print above the question.
 
         Returns:

@@ -116,7 +116,7 @@ class LinearModel:
 
     @cached_property
     def cases(self) -> Array:
-        """Indices of all noise cases; without `compound`, only of those without a deviation of the rubber."""
+        """Indices of the noise cases (assumed sizes of the errors of rig and rubber) that apply to this model."""
         return np.flatnonzero((self.rig.deviation == 0.0) | (self.compound is not None))
 
     def project(self, cases: Array) -> Projection:
@@ -126,7 +126,7 @@ class LinearModel:
             cases: indices of c noise cases (assumed sizes of the errors of rig and rubber), (c,).
 
         Returns:
-            For each case, the log evidence without a further explanation, and what is needed to add explanations.
+            Log evidence without a further explanation in each case, and the projected residuals, to test explanations.
         """
         rig, rows, deviates = self.rig, self.rows, bool(self.rig.deviation[cases].any())
         none = Group(np.zeros((0, self.residual.size)), np.zeros((0, 1)), act_together=True)

@@ -153,7 +153,7 @@ class Search:
         return finding.verdict == "named" and finding.reported[0].best.refitted
 
     def _refit_linear(self) -> None:
-        """Refit the most probable hypotheses whose evidence still comes from the linear model alone."""
+        """Refit, with all parameters, probable hypotheses whose evidence so far is from the linearised model."""
         for _ in range(_SETTLED):
             ordered = self._ordered_hypotheses()
             share = np.exp([hypothesis.log_posterior - ordered[0].log_posterior for hypothesis in ordered])

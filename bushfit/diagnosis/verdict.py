@@ -166,7 +166,7 @@ def _verdict_on_parts(likely: Sequence[Composition], nothing: float, leads: Sequ
 
 
 def _leads(pairs: Sequence[tuple[Hypothesis, float]]) -> tuple[str, ...]:
-    """Names of the effects of the most probable hypothesis that nearly all hypotheses, by probability, also have.
+    """Effects of the most probable hypothesis that hypotheses with most of the total probability have in common.
 
     Args:
         pairs: hypotheses and their posterior probabilities, the most probable first.

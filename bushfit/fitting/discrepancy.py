@@ -232,10 +232,10 @@ class Discrepancy:
 
     @cached_property
     def complex_shapes(self) -> Array:
-        """Relative errors of the stiffness at p operating points in each of q patterns, in phase, then in quadrature.
+        """Relative changes of the complex stiffness in q patterns of the process, first in phase, then in quadrature.
 
         Returns:
-            Complex relative errors, (2 q, p).
+            Changes at the p operating points, complex (2 q, p).
         """
         return np.concatenate((self.shapes, 1j * self.shapes))
 

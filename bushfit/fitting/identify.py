@@ -151,7 +151,7 @@ def _percent(error: float) -> str:
 
 
 def _error_directions(slopes: Array) -> Array:
-    """Independent errors of relative parameter changes: eigenvectors of their covariance times their standard errors.
+    """Independent errors of the parameters: eigenvectors of their covariance, times the standard error of each.
 
     Args:
         slopes: derivatives of the n whitened residuals with respect to relative changes of k parameters, (k, n).

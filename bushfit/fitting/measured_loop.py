@@ -239,7 +239,7 @@ class MeasuredLoop(MeasuredBase):
         return np.abs(self.misfit(model))
 
     def displayed_residual(self, model: Model) -> Array:
-        """Residuals for charts, model minus measured in units of noise, (size,): also of points without weight."""
+        """Residuals for charts, model minus measured in units of noise, (size,), including points without weight."""
         distance = (self.response(model) - self.measured_force) / self.noise
         return np.where(self.weights > 0.0, self.misfit(model), distance)
 
@@ -361,13 +361,13 @@ class MeasuredLoop(MeasuredBase):
         return SharedErrors.from_columns(np.concatenate((rows, _ERROR_SIZES[:1, None] * self._unit_offset)))
 
     def noise_sensitivity(self, influence: Array) -> dict[Hashable, Array]:
-        """Sensitivity of k parameter estimates to errors of each noise variance that was itself estimated.
+        """Change of k parameter estimates by an error of each noise variance that was estimated from the tests.
 
         `influence`: change of each estimate per unit of each whitened residual, (k, size).
 
         Returns:
-            By identifier of the variance, (k, size): the influence times the whitened derivative of the residuals'
-            covariance with respect to the variance, times the standard error of the variance.
+            By identifier of the variance, (k, size): change of the influence of each residual by one standard error of
+            the variance.
         """
         reaction = self.shared_errors.whiten(influence)
         whole = reaction @ self._fundamental.T if self.fundamental_only else reaction
@@ -380,7 +380,7 @@ class MeasuredLoop(MeasuredBase):
         return {(self.name, index): self.shared_errors.whiten(part) for index, part in enumerate(parts)}
 
     def extra_covariance(self, influence: Array) -> Array:
-        """Covariance, (k, k), of k parameter estimates due to errors that the weights of the residuals exclude.
+        """Covariance of k parameter estimates due to errors that the weights of the residuals do not contain, (k, k).
 
         The gain error is added. The model error of the first harmonic is subtracted, because a smooth error of the
         model includes it. `influence`: change of each estimate per unit of each whitened residual, (k, size).

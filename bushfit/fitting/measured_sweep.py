@@ -222,7 +222,7 @@ class MeasuredSweep(MeasuredBase):
 
     @cached_property
     def unit_model_error(self) -> SharedErrors:
-        """Relative model error of 100 %, in phase and in quadrature, which the repeats of an operating point share."""
+        """Error of the model of 100 % of |K|, in phase and in quadrature; repeats of an operating point share it."""
         points = np.unique(self.frequency + 1j * self.amplitude, return_inverse=True)[1]
         return SharedErrors.of_groups(points, self.covariance.per_scatter, (1.0, 1.0))
 
@@ -248,7 +248,7 @@ class MeasuredSweep(MeasuredBase):
         return self.covariance.noise_sensitivity(influence)
 
     def extra_covariance(self, influence: Array) -> Array:
-        """Covariance, (k, k), of k parameter estimates due to errors that the weights of the residuals exclude.
+        """Covariance of k parameter estimates due to errors that the weights of the residuals do not contain, (k, k).
 
         With a model error, the errors shared by runs and lines are added, and the independent model error is subtracted
         because a smooth error includes it. `influence`: change of each estimate per unit of each whitened residual,

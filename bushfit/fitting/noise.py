@@ -195,7 +195,7 @@ def _scatter_growth(lines: Sequence[LineNoise]) -> tuple[float, float] | None:
     from scipy.optimize import minimize_scalar
 
     def unlikely(exponent: float) -> float:
-        """Negative log likelihood of the deviations for an exponent of the growth."""
+        """Negative log likelihood of the deviations if the scatter grows with this power of the step."""
         parts = np.split(ratio * np.exp(-exponent * centred), np.cumsum([log.size for log in logs])[:-1])
         return sum(part.size * float(np.log(part.mean())) for part in parts)
 

@@ -85,8 +85,8 @@ def with_preload(data: PreparedCampaign) -> PreparedCampaign:
     return replace(data, campaign=replace(data.campaign, fit=fit), preload_notes=tuple(notes))
 
 
-def other_line(found: FitResult) -> tuple[Alternative, ...]:
-    """Alternative fit in which friction and springpot are linear in the preload instead of its square, or the reverse.
+def alternative_preload_law(found: FitResult) -> tuple[Alternative, ...]:
+    """Alternative fit in which friction and springpot depend on the preload instead of its square, or the reverse.
 
     Args:
         found: fit with the effect of preload.

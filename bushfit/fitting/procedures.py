@@ -26,7 +26,7 @@ from bushfit.fitting.coordinates import Bounds, Coordinates
 from bushfit.fitting.identify import undetermined_parameters
 from bushfit.fitting.levels import LevelErrors
 from bushfit.fitting.model_error import with_excess_errors
-from bushfit.fitting.preload import PRELOAD, other_line
+from bushfit.fitting.preload import PRELOAD, alternative_preload_law
 from bushfit.fitting.preparation import MeasuredTest, sources, with_level_errors
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.problem import FitResult
@@ -106,7 +106,7 @@ def fit_joint(
     notes += unfitted_warnings(found.model, unused, NEXT)
     usable = expected_errors(found.model, found.problem.tests, unused, found)
     result = build_result([found], data.bounds, unused=unused, advice=NEXT)
-    result = replace(result, usable=usable, model_error=error, alternatives=other_line(found))
+    result = replace(result, usable=usable, model_error=error, alternatives=alternative_preload_law(found))
     result = _with_campaign(data, [found], result, notes)
     return replace(result, profile=profile95(found, result.covariance)) if profile else result
 

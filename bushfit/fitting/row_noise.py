@@ -104,7 +104,7 @@ class RowNoise:
         return white
 
     def noise_sensitivity(self, influence: Array) -> list[Array]:
-        """Change of the influence of the rows on k parameter estimates due to an error of each parameter of the noise.
+        """Change of the weights of the rows in k parameter estimates due to an error of each parameter of the noise.
 
         Args:
             influence: weight of each whitened row in the estimates, (k, n).

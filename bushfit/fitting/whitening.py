@@ -50,10 +50,10 @@ class Whitening:
         return self._line_errors.whiten(self.runs.whiten(rows))
 
     def scaled(self, deviation: Array, *, shared: bool = True) -> Array:
-        """Scale deviations by the scatter of each point, without whitening.
+        """Divide the deviations in gain and phase by the scatter of each point, without whitening.
 
         Args:
-            deviation: deviations, complex (n,).
+            deviation: relative differences in |K| + i differences in phase [rad], (n,).
             shared: True to subtract the likeliest error that the points of each run share.
 
         Returns:
@@ -68,7 +68,7 @@ class Whitening:
         return rows.reshape(2, -1) / self.random
 
     def noise_sensitivity(self, influence: Array) -> dict[Hashable, Array]:
-        """Sensitivity of k parameter estimates to the error of each estimated noise variance.
+        """Change of k parameter estimates by an error of each noise variance that was estimated from the tests.
 
         Args:
             influence: weight of each whitened residual in the estimates, (k, 2 n).

@@ -62,8 +62,9 @@ class ModelInformation:
     """Fisher information of one run of each candidate test on k parameters and e departures from the model.
 
     Args:
-        products: inner products of the first 2 + k columns with all columns, (tests, 2 + k, 2 + k + e). The columns are
-            unit gain error, unit phase error, k parameters, and e departures (missing effects or rival models).
+        products: inner products of changes of the residuals, (tests, 2 + k, 2 + k + e): of the first 2 + k with all.
+            The changes are by a gain error, a phase error, k parameters, and e departures (missing effects or rival
+            models).
         squares: sum of squares of each departure over the residuals of a run, (tests, e).
         class_ratios: largest change of the response by each departure at any point of a test, divided by the accuracy
             class of the rig, (tests, e).

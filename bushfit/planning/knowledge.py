@@ -126,7 +126,7 @@ def _check_rivals(names: Iterable[str], possible: Container[str]) -> None:
 def _with_bounded_parameters(
     knowledge: Knowledge, bounded: tuple[str, ...], data_sets: Sequence[MeasuredTest]
 ) -> Knowledge:
-    """Add the parameters at a bound to knowledge, with the covariance that they would have if they were free.
+    """Add the parameters at a bound to the knowledge before a plan, with the covariance they would have if free.
 
     Parameters without effect on these tests are omitted. If the residuals of the fit exceed the assumed noise, the
     covariance is larger by the same ratio as that of the other parameters.
@@ -178,7 +178,7 @@ def _add_effects(plain: FitResult, names: Sequence[str], fixed: Sequence[str], b
 
 
 def undecided_effects(diagnosis: Diagnosis) -> list[tuple[str, ...]]:
-    """List the sets of effects that explain the tests of a diagnosis alike and that a further test may separate.
+    """List sets of effects that explain the tests equally well, between which a further test may decide.
 
     Mistakes in the campaign and faults of the rig are excluded, because no planned test separates them.
 

@@ -38,7 +38,8 @@ class PlannedQuantity:
         scale: relative change of the quantity per change of the phase: (1 + loss^2)/loss for a loss factor; 1 for other
             quantities, (n,).
         model_error: standard error due to the model error, which no test lowers, (n,).
-        undecided: half width that explanations which the tests cannot distinguish add to the 95 % interval, (n,).
+        undecided: addition to the half width of the 95 % interval, because the tests cannot distinguish several
+            explanations, (n,).
         prediction: prediction with these operating points; None for a parameter.
         target: largest half width of the 95 % interval that the user allows; infinite without a target.
     """

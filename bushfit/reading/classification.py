@@ -115,14 +115,15 @@ def classify(
 
 
 def _require_plain_names(table: Table, roles: Mapping[str, Column]) -> None:
-    """Ask about columns whose names contain a factor, or a number that may be that of a repeat or a part.
+    """Refuse column names with more than one meaning: a factor in the name ("K x 1000"), or a number ("K1").
 
     Args:
         table: header and rows of the table.
         roles: columns by role, without those that the user states.
 
     Raises:
-        MeasurementError: such a column.
+        MeasurementError: a name contains a factor, or numbers in names may be those of repeats, of parts, or of storage
+            and loss.
     """
     names = {role: split_unit(column.header)[0].strip() for role, column in roles.items()}
     for role, name in names.items():

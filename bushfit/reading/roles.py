@@ -47,11 +47,12 @@ def si_unit(role: str, motion: Motion) -> str:
 
 
 def stated_once(headers: Sequence[str], rows: Iterable[Sequence[str]], vocabulary: Vocabulary) -> frozenset[int]:
-    """Indices of columns of a sweep that are filled only in the first of several rows, as an amplitude may be.
+    """Indices of columns, such as an amplitude, whose cells are filled only where their value changes.
 
     Args:
         headers: header cells of the table.
-        rows: cells of its first rows, as texts; only those with a stiffness or its loss count, not those of waveforms.
+        rows: cells of its first rows, as texts; rows without a stiffness or loss, such as those of waveforms, are
+            ignored.
         vocabulary: known column names.
     """
     roles = [heading.role if header and (heading := vocabulary.heading(header)) else "" for header in headers]

@@ -160,7 +160,7 @@ def _medians_if_separate(amplitude: Floats, rank: NDArray[np.intp]) -> Floats:
 
 
 def group_rows(*keys: Floats) -> list[NDArray[np.intp]]:
-    """Return the row indices of each group of rows that agree in all keys, (n,) each, such as frequency and level."""
+    """Group n rows whose values agree in all keys, such as frequency and amplitude, (n,) each; return their indices."""
     group = _group_numbers(*keys)
     return np.split(np.argsort(group, kind="stable"), np.cumsum(np.bincount(group))[:-1])
 

@@ -218,7 +218,13 @@ class Table:
         return kind(problem, file=self.file, place=self.place(line, column), **details)
 
     def header_error(self, problem: str, found: str | None = None, **details: Any) -> MeasurementError:
-        """Return an error for the header line; if the file is a table, `found` is by default the header cells."""
+        """Return an error that names the header line.
+
+        Args:
+            problem: description of the problem in one clause.
+            found: text found; None for the header cells, or their number if the file is not a table of numbers.
+            **details: texts for `expected` and `hint` of the error.
+        """
         if found is None and self.is_table:
             found = ", ".join(self.headers)
         found = found or f"{len(self.headers)} cell{'s' * (len(self.headers) != 1)}, without the name of a column"
