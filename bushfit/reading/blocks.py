@@ -289,7 +289,8 @@ def _with_plain_cells(source: RowSource, layout: Layout) -> tuple[RowSource, Lay
     headers, row_of_units = list(layout.headers), list(layout.units)
     by_column = [[str(row[n]) for row in first if n < len(row) and row[n] != ""] for n in range(len(headers))]
     is_complex = [any(map(_COMPLEX.fullmatch, texts)) for texts in by_column]
-    unit_of = [_common_unit(texts) for texts in by_column]
+    stated = [in_row or split_unit(header)[1] or "" for header, in_row in zip(headers, row_of_units, strict=True)]
+    unit_of = [_common_unit(texts, unit) for texts, unit in zip(by_column, stated, strict=True)]
     if not any(is_complex) and not any(unit_of):
         return source, layout
     lines = [(line.number, list(cells_of(line, layout.delimiter))) for line in source.lines(layout.lines_before_data)]
@@ -317,11 +318,17 @@ def _complex_parts(text: str) -> list[str | float]:
     return [match[1], re.sub(r"\s|^\+", "", match[2])] if match else [text, ""]
 
 
-def _common_unit(texts: Sequence[str]) -> str:
-    """Unit behind the number in each of several cells, such as "mm" of "0.5 mm"; "" without such a unit."""
+def _common_unit(texts: Sequence[str], stated: str) -> str:
+    """Unit behind the number in each of several cells, such as "mm" of "0.5 mm"; "" without such a unit.
+
+    If the header states the same unit in other words, such as deg for °, or two ratios, its unit is returned.
+    """
     found = list(dict.fromkeys(match["unit"] if (match := WITH_UNIT.fullmatch(text)) else "?" for text in texts))
     is_temperature = bool(found) and all(map(units.kelvin_scale, found)) and len(found) == 1
     is_unit = bool(found) and all(units.is_compatible(unit, found[0]) for unit in found)
+    if is_unit and stated and units.is_compatible(found[0], stated):
+        sizes = [units.si_factor(unit, found[0]) for unit in (found[0], stated)]
+        return stated if sizes[0] == sizes[1] or units.is_compatible(stated, "1") else found[0]
     return found[0] if is_temperature or is_unit else ""
 
 

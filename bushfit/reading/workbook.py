@@ -3,8 +3,9 @@
 import io
 import re
 import zipfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
+from xml.etree import ElementTree
 
 from bushfit.errors import MeasurementError
 from bushfit.reading.source import Sheet
@@ -21,6 +22,10 @@ _NOT_COMPUTED = re.compile(
 )
 #: Row of a sheet of an xlsx workbook that is hidden, by a user or a filter.
 _HIDDEN_ROW = re.compile(rb'<(?:\w+:)?row (?=[^>]*\bhidden="(?:1|true)")[^>]*\br="(\d+)"')
+#: Cell of a sheet of an xlsx workbook with one of several styles.
+_STYLED_CELL = r'<(?:\w+:)?c (?=[^>]*\bs="(?:{styles})")[^>]*\br="([A-Z]+)(\d+)"'
+#: Numbers of the formats for percentages that all workbooks have.
+_PERCENTAGES = ("9", "10")
 
 
 def workbook(data: bytes, _: Path) -> Iterator[Sheet]:
@@ -34,20 +39,24 @@ def workbook(data: bytes, _: Path) -> Iterator[Sheet]:
     """
     import python_calamine as calamine
 
-    contents = _xml_of_sheets(data)
+    contents, percent_styles = _xml_of_sheets(data)
     book = calamine.load_workbook(io.BytesIO(data))
     visible_names = {sheet.name for sheet in book.sheets_metadata if sheet.visible == calamine.SheetVisibleEnum.Visible}
-    cells_left, has_xml = _MOST_CELLS, len(contents) == len(book.sheet_names)
-    for number, name in enumerate(book.sheet_names):
-        sheet = book.get_sheet_by_name(name)
+    cells_left = _MOST_CELLS
+    for name in book.sheet_names:
+        sheet, xml = book.get_sheet_by_name(name), contents.get(name, b"")
         cells_left -= sheet.height * sheet.width
         if cells_left < 0:
             raise _too_large(f'more, with sheet "{name}"')
+        rows = [_row(row) for row in sheet.to_python(skip_empty_area=False)]
+        for row, column in _cells_with(percent_styles, xml):
+            if row < len(rows) and column < len(rows[row]) and isinstance(value := rows[row][column], float):
+                rows[row][column] = f"{100.0 * value:.12g}%"
         yield Sheet(
             name,
-            [_row(row) for row in sheet.to_python(skip_empty_area=False)],
-            lacks_values=lambda: any(map(_NOT_COMPUTED.search, contents)),
-            hidden=tuple(map(int, _HIDDEN_ROW.findall(contents[number]))) if has_xml else (),
+            rows,
+            lacks_values=lambda: any(map(_NOT_COMPUTED.search, contents.values())),
+            hidden=tuple(map(int, _HIDDEN_ROW.findall(xml))),
             is_visible=name in visible_names or not visible_names,
         )
 
@@ -58,28 +67,58 @@ def _too_large(found: str) -> MeasurementError:
     return MeasurementError("the workbook is too large", found=found, expected=expected, hint="save the sheet as CSV")
 
 
-def _xml_of_sheets(data: bytes) -> list[bytes]:
-    """XML of each sheet in an xlsx workbook; an empty list for other formats.
+def _xml_of_sheets(data: bytes) -> tuple[dict[str, bytes], list[str]]:
+    """Read the parts of an xlsx workbook that the library for workbooks does not evaluate.
+
+    Returns:
+        XML of each sheet by its name, and the numbers of the cell styles that show percentages; empty for other formats.
 
     Raises:
         MeasurementError: sheets are too large, or have a very distant cell (the reader allocates all cells up to it).
     """
     if not data.startswith(b"PK"):
-        return []
+        return {}, []
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         parts = [part for part in archive.infolist() if re.search(r"sheet[^/]*\.xml$", part.filename)]
         size = sum(part.file_size for part in parts)
         if size > _MOST_BYTES:
             raise _too_large(f"{size} bytes in its sheets")
         contents = {part.filename: archive.read(part) for part in parts}
+        book, links, styles = (
+            list(ElementTree.fromstring(archive.read(part)).iter()) if part in archive.namelist() else []
+            for part in ("xl/workbook.xml", "xl/_rels/workbook.xml.rels", "xl/styles.xml")
+        )
     for name, content in contents.items():
         if match := _DIMENSION.search(content[:10_000]):
-            column = 0
-            for letter in match[1]:
-                column = 26 * column + letter - 64
-            if column * int(match[2]) > _MOST_CELLS:
-                raise _too_large(f"{match[2].decode()} rows of {column} columns in {name}")
-    return [contents[name] for name in sorted(contents, key=lambda name: (len(name), name))]
+            last_row, last_column = int(match[2]), _column_index(match[1].decode())
+            if (last_column + 1) * last_row > _MOST_CELLS:
+                raise _too_large(f"{last_row} rows of {last_column + 1} columns in {name}")
+    targets = {link.get("Id"): str(link.get("Target")).lstrip("/").removeprefix("xl/") for link in links}
+    sheets = {
+        str(sheet.get("name")): targets.get(next((text for key, text in sheet.items() if key.endswith("}id")), ""), "")
+        for sheet in book
+        if sheet.tag.endswith("}sheet")
+    }
+    formats = {one.get("numFmtId"): str(one.get("formatCode")) for one in styles if one.tag.endswith("}numFmt")}
+    cell_styles = next((list(one) for one in styles if one.tag.endswith("}cellXfs")), [])
+    numbers = [style.get("numFmtId", "") for style in cell_styles]
+    percent_styles = [str(n) for n, one in enumerate(numbers) if one in _PERCENTAGES or "%" in formats.get(one, "")]
+    return {name: contents.get(f"xl/{target}", b"") for name, target in sheets.items()}, percent_styles
+
+
+def _cells_with(styles: Collection[str], xml: bytes) -> Iterator[tuple[int, int]]:
+    """Yield row and column index of each cell of a sheet with one of these styles."""
+    pattern = _STYLED_CELL.format(styles="|".join(styles)).encode()
+    for letters, number in re.findall(pattern, xml) if styles else ():
+        yield int(number) - 1, _column_index(letters.decode())
+
+
+def _column_index(letters: str) -> int:
+    """Index of a column of a sheet, from 0, by its letters, such as "AB"."""
+    index = 0
+    for letter in letters:
+        index = 26 * index + ord(letter) - 64
+    return index - 1
 
 
 def _row(cells: Sequence[object]) -> list[str | float]:
