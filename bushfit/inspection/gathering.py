@@ -21,7 +21,7 @@ from bushfit.inspection.labels import count_temperatures
 from bushfit.inspection.opening import inspect_file
 from bushfit.inspection.recognition import open_table, recognize_table
 from bushfit.inspection.record import Inspection
-from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS, split_unit
+from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS
 from bushfit.reading.instruments import word_for_part
 from bushfit.reading.labelled import same_text
 from bushfit.reading.layout import FileFormat
@@ -177,7 +177,7 @@ def split_rows(source: TestSource) -> tuple[list[TestSource], list[str]]:
     """
     test_options, tests, left_out = source.test_options, list[TestSource](), list[str]()
     try:
-        table, is_sweep = recognize_table(source.file, source.without("direction", "specimen_number").test_options)
+        table, _ = recognize_table(source.file, source.without("direction", "specimen_number").test_options)
         columns = dict(table.row_labels)
         if "run" in columns and "time" in table.roles:
             time = table.read({"time": table.roles["time"]}, fewest_rows=1)[0]["time"]
@@ -187,20 +187,19 @@ def split_rows(source: TestSource) -> tuple[list[TestSource], list[str]]:
         levels = {row: [dict[str, str]()] for row in labels}
         if not table.roles.keys().isdisjoint(CONDITIONS):
             rows_of = {row: np.flatnonzero([label == row for label in labels]) for row in levels}
-            if is_sweep and not columns:
+            if not columns:
                 rows_of = {(): np.arange(sum(1 for _ in table.rows()))}
-            levels = {row: split_conditions(table, rows, test_options, table.motion) for row, rows in rows_of.items()}
+            levels = {row: split_conditions(table, rows, test_options) for row, rows in rows_of.items()}
     except BushfitError:  # which the inspection of the file reports
         return [source], []
     for texts, tests_at_levels in levels.items():
         keys: dict[str, Any] = dict(zip(columns, texts, strict=True))
         run: dict[str, Any] = {}
         if text := keys.pop("run", None):
-            header = table.headers[columns["run"][0]]
-            name, unit, _ = split_unit(header)
-            run = {"rows": {header: text}} | ({name: f"{text} {unit}"} if name in CONDITIONS and unit else {})
+            run = {"rows": {table.headers[columns["run"][0]]: text}}
         is_direction = keys.get("direction", "axial") in [*Direction]
-        if is_direction and all(same_text(str(test_options.get(key, text)), text) for key, text in keys.items()):
+        is_stated = all(same_text(str(test_options.get(key, text)), text) for key, text in keys.items())
+        if is_direction and is_stated and tests_at_levels:
             tests += [replace(source, test_options={**test_options, **keys, **run, **test}) for test in tests_at_levels]
         else:
             why = "other values were stated" if is_direction else "the direction is unknown"
@@ -254,7 +253,7 @@ def needs_option(file: Path, key: str, role: str, test_options: Mapping[str, Any
         For "columns", True if the file has the stated column; for "units", True if the header of the column states no
         unit. False if not, and None if the file cannot be read or has no column of this role.
     """
-    names = LOOP_COLUMNS if role in LOOP_COLUMNS else SWEEP_COLUMNS
+    names = SWEEP_COLUMNS if role in SWEEP_COLUMNS else LOOP_COLUMNS
     columns = {role: test_options["columns"][role]} if key == "columns" else test_options["columns"]
     try:
         column = open_table(file, names, {**test_options, "units": {}, "columns": columns}).roles.get(role)

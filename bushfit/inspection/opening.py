@@ -230,7 +230,8 @@ def describe_columns(table: Table, *, is_sweep: bool) -> tuple[ColumnDescription
     Returns:
         The columns in order, with the range of their values in the unit of the file.
     """
-    ranged = {*chain(*PAIRS), "frequency", "amplitude", "temperature", "repeat"} if is_sweep else {*table.roles}
+    ranged = {*chain(*PAIRS), "frequency", "amplitude", "temperature", "repeat"}
+    ranged = ranged if is_sweep else {"time", "displacement", "force"}
     wanted = {
         role: column for role, column in table.roles.items() if role in ranged and table.holds_numbers(column.index)
     }

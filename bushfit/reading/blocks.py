@@ -33,6 +33,8 @@ _COMPLEX = re.compile(
 )
 #: Names of the runs of a test, in the titles of blocks.
 _RUNS = Vocabulary({"repeat": SWEEP_COLUMNS["repeat"]})
+#: Direction or part of a block whose lines state none, unlike those of another block.
+_NOT_STATED = "not stated"
 #: First rows that are searched for complex numbers and units; chosen: room for remarks.
 _FIRST = 8
 
@@ -267,14 +269,15 @@ def _label_columns(labels: Sequence[Labels], parts: Sequence[str], roles: set[st
             columns[f"{role}{COUNTED[convention]} [{unit}]"] = [float(one.text.split()[0]) for (one,) in by_block]
     for role in CONDITIONS:
         texts = [(getattr(label, role) or "").strip().partition(" ") for label in labels]
-        if role not in roles and all(map(any, texts)) and len({unit for *_, unit in texts}) == 1:
-            columns[f"{role} [{texts[0][2]}]"] = [float(number) for number, *_ in texts]
-    if all(label.direction for label in labels):
-        columns["direction"] = [str(label.direction) for label in labels]
+        in_units = {unit for number, _, unit in texts if number}
+        if role not in roles and len(in_units) == 1:
+            columns[f"{role} [{in_units.pop()}]"] = [float(number) if number else "" for number, *_ in texts]
+    if any(label.direction for label in labels):
+        columns["direction"] = [label.direction or _NOT_STATED for label in labels]
     are_runs = all(_RUNS.heading(title.rstrip(" #.0123456789")) for title in parts)
-    numbers = [label.specimen_number or "" for label in labels]
-    named = numbers if all(numbers) else [] if columns else parts
-    if named and all(named) and len(set(named)) > 1:
+    numbers = [label.specimen_number or _NOT_STATED for label in labels]
+    named = numbers if set(numbers) != {_NOT_STATED} else [] if columns else parts
+    if len(set(named)) > 1:
         columns["repeat" if named == parts and are_runs else "part"] = list(named)
     columns["block"] = [str(number) for number in range(1, len(labels) + 1)]
     return columns

@@ -37,7 +37,8 @@ def _columns_of(test: str) -> dict[str, list[str]]:
 
 #: Names of the columns of a loop, a sweep, a test of strain and modulus, a resonance test (a mass on a mount on a
 #: shaker) and a displacement history, by role: the quantity in the column.
-LOOP_COLUMNS, SWEEP_COLUMNS, STRAINING_COLUMNS = _columns_of("loop"), _columns_of("sweep"), _columns_of("straining")
+SWEEP_COLUMNS, STRAINING_COLUMNS = _columns_of("sweep"), _columns_of("straining")
+LOOP_COLUMNS = {**_columns_of("loop"), **{role: SWEEP_COLUMNS[role] for role in ("temperature", "preload")}}
 RESONANCE_COLUMNS = {"frequency": SWEEP_COLUMNS["frequency"], **_columns_of("resonance")}
 DISPLACEMENT_COLUMNS = {
     "time": LOOP_COLUMNS["time"],
@@ -52,12 +53,11 @@ ALL_COLUMNS = {
 }
 #: Roles with a common property, in a fixed order, by property (see words.toml).
 ROLE_SETS = {kind: dict.fromkeys(roles).keys() for kind, roles in WORDS["role_sets"].items()}
-#: Names of columns that assign rows to tests, by what they contain: direction, specimen_number, run or preload.
+#: Names of columns that assign rows to tests, by what they contain: direction, specimen_number or run.
 ROW_COLUMNS = {
     **WORDS["rows"],
     "specimen_number": WORDS["above"]["specimen_number"],
     "run": [*SWEEP_COLUMNS["repeat"], "block"],
-    "preload": SWEEP_COLUMNS["preload"],
 }
 #: Convention by which an amplitude is stated.
 AmplitudeConvention = Literal["zero-to-peak", "peak-to-peak", "rms"]

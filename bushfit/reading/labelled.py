@@ -118,9 +118,7 @@ def find_labels(table: Table) -> Mapping[str, tuple[int, Sequence[str]]]:
     labels: dict[str, tuple[int, Sequence[str]]] = {}
     for index, header in enumerate(table.headers):
         heading = _LABELS.heading(header) if header else None
-        role, is_loop = heading.role if heading else "", {"time", "displacement"} <= set(table.roles)
-        if role == "preload":  # of loops, which are runs if the time begins anew
-            role = "run" if is_loop else ""
+        role = heading.role if heading else ""
         if role in ("", *labels) or (header == "block" and "displacement" not in table.roles):
             continue
         if _may_distinguish_tests(table, index):

@@ -10,6 +10,7 @@ from bushfit.geometry import Place
 from bushfit.reading.finding import find_table
 from bushfit.reading.headers import LOOP_COLUMNS, Column
 from bushfit.reading.labelled import Rows, note_not_understood
+from bushfit.reading.levels import mean_temperature, rows_of_test
 from bushfit.reading.measurement import Floats, Loop
 from bushfit.reading.parts import OpenedFile
 from bushfit.reading.preload import parse_preload
@@ -52,6 +53,9 @@ def read_loop(
     wanted = loop_columns(table, direction, test)
     values, notes = table.read(wanted, fewest_rows=_FEWEST_LOOP_ROWS)
     table = table.needing(wanted)
+    selected, degrees = rows_of_test(table, test, direction, values["force"].size)
+    if selected.size < values["force"].size:
+        values = {role: numbers[selected] for role, numbers in values.items()}
     displacement, force = values["displacement"], values["force"]
     for role in ("displacement", "force"):
         if np.ptp(values[role][:_FEWEST_LOOP_ROWS]) < LEAST_VALUE and np.ptp(values[role]) < LEAST_VALUE:
@@ -78,7 +82,8 @@ def read_loop(
     else:
         time = test.rebuild_time(displacement)
         notes += (table.note_sampling,) if stated_rate else ()
-    unknown = note_not_understood(table, table.row_labels, None)
+    unknown = note_not_understood(table, table.row_labels, selected)
+    temperature = mean_temperature(degrees) if test.temperature is None else test.temperature
     return Loop(
         name or table.file.stem,
         direction,
@@ -86,10 +91,10 @@ def read_loop(
         displacement,
         force,
         test.noise,
-        test.source(table.opened.checksum.result(), test.temperature, (*notes, *unknown)),
+        test.source(table.opened.checksum.result(), temperature, (*notes, *unknown)),
         "time" in values or test.sampling_rate is not None,
         test.weight,
-        temperature=test.temperature,
+        temperature=temperature,
         preload=parse_preload(test.preload, direction),
     )
 

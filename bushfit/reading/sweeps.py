@@ -14,7 +14,7 @@ from bushfit.geometry import Place, strain_factor_of_files
 from bushfit.reading.finding import find_table
 from bushfit.reading.headers import SWEEP_COLUMNS, ZERO_TO_PEAK, AmplitudeConvention, Column
 from bushfit.reading.labelled import Rows, column_texts, note_not_understood
-from bushfit.reading.levels import read_condition
+from bushfit.reading.levels import mean_temperature, rows_of_test
 from bushfit.reading.measurement import Floats, Sweep
 from bushfit.reading.parts import OpenedFile
 from bushfit.reading.preload import parse_preload
@@ -100,12 +100,9 @@ def read_sweep(
     check_stiffness(table, pair, columns, values, stiffness, loss_factor)
     frequency = values["frequency"]
     points = (frequency, values["amplitude"])
-    selected, degrees = _rows_of_test(table, "temperature", np.arange(frequency.size), points, direction, test)
-    selected, _ = _rows_of_test(table, "preload", selected, points, direction, test)
-    kelvin = test.temperature if degrees is None else degrees[selected] + si.CELSIUS
-    temperature = test.temperature
-    if degrees is not None and temperature is None:
-        temperature = round(float(degrees[selected].mean()), 2) + si.CELSIUS
+    selected, degrees = rows_of_test(table, test, direction, frequency.size, points)
+    kelvin = test.temperature if degrees is None else degrees + si.CELSIUS
+    temperature = mean_temperature(degrees) if test.temperature is None else test.temperature
     repeat = _repeat_numbers(table, values)
     frequency, amplitude = frequency[selected], values["amplitude"][selected]
     reached = values["amplitude_reached"][selected] if "amplitude_reached" in values else None
@@ -186,59 +183,6 @@ def sweep_columns(
         if column := columns.get(role):
             columns[role] = replace(column, scale=ZERO_TO_PEAK[column.convention or convention] * column.scale)
     return columns
-
-
-def _rows_of_test(
-    table: Table, role: str, rows: NDArray[np.intp], points: tuple[Floats, Floats], place: Place, test: SweepFile
-) -> tuple[NDArray[np.intp], Floats | None]:
-    """Select the rows of a sweep at the temperature or preload of the test.
-
-    Args:
-        table: table of the sweep.
-        role: "temperature" or "preload".
-        rows: indices of the rows to select from, (n,).
-        points: frequency and amplitude of all rows.
-        place: direction of the bushing, or the specimen.
-        test: table [[sweeps]] of the campaign.
-
-    Returns:
-        Indices of the selected rows; and the temperature [degC] or preload of all rows in the unit of the file, None
-        without a column.
-
-    Raises:
-        MeasurementError: the file has several temperatures or preloads, and none is stated, or too few rows are near
-            the stated one.
-    """
-    condition = read_condition(table, role, place.motion)
-    if condition is None:
-        return rows, None
-    levels, stated, tolerance = condition.levels(rows, points), None, condition.step
-    if role == "temperature" and test.temperature is not None:
-        stated = test.temperature - si.CELSIUS
-    elif role == "preload" and len(levels) > 1 and (preload := parse_preload(test.preload, place)):
-        is_same = si.is_compatible(condition.unit, preload.unit)
-        stated = preload.value / si.si_factor(condition.unit, preload.unit) if is_same else np.nan
-        tolerance /= 2.0
-    if stated is None and len(levels) == 1:
-        return levels[0], condition.values
-    problem, expected, nearest = f"this file contains tests at several {role}s", f"one {role}", levels[0]
-    if stated is not None:
-        selected = rows[np.abs(condition.values[rows] - stated) <= tolerance]
-        if selected.size >= _FEWEST_SWEEP_ROWS:
-            return selected, condition.values
-        problem = f"too few rows are near the stated {role}"
-        unit = "K" if condition.unit == "degC" else condition.unit
-        expected = f"{_FEWEST_SWEEP_ROWS} rows or more within {tolerance:g} {unit} of {stated:.4g} {condition.unit}"
-        levels = condition.groups(rows)
-        nearest = min(levels, key=lambda level: abs(condition.values[level].mean() - stated))
-    raise table.error(
-        problem,
-        column=condition.column,
-        found=", ".join(condition.text(level).removesuffix(f" {condition.unit}") for level in levels)
-        + f" {condition.unit}",
-        expected=expected,
-        hint=f'state {role} = "{condition.text(nearest)}" in the campaign; several tests may name one file',
-    )
 
 
 def _repeat_numbers(table: Table, values: Mapping[str, Floats]) -> NDArray[np.int64] | None:

@@ -71,7 +71,8 @@ def _xml_of_sheets(data: bytes) -> tuple[dict[str, bytes], list[str]]:
     """Read the parts of an xlsx workbook that the library for workbooks does not evaluate.
 
     Returns:
-        XML of each sheet by its name, and the numbers of the cell styles that show percentages; empty for other formats.
+        XML of each sheet by its name, and the numbers of the cell styles that show percentages; both are empty for
+        other formats.
 
     Raises:
         MeasurementError: sheets are too large, or have a very distant cell (the reader allocates all cells up to it).
