@@ -178,10 +178,10 @@ def fit_two_step(data: PreparedCampaign) -> TwoStep:
     """
     loops, sweep = data.static_loops(), data.smallest_sweep
     springpot, passes = dict[str, float](), list[Mapping[str, float]]()
-    points, images = list[Array](), list[Array]()
+    points, images, model = list[Array](), list[Array](), None
     while len(passes) < _MOST_PASSES:
-        static = _fit_step(data, loops, BASE, springpot) if springpot else _fit_without_springpot(data)
-        dynamic = _fit_step(data, [sweep], BASE, {name: static.model.values[name] for name in STATIC})
+        static = _fit_step(data, loops, BASE, springpot, model) if springpot else _fit_without_springpot(data)
+        dynamic = _fit_step(data, [sweep], BASE, {name: static.model.values[name] for name in STATIC}, model)
         model, before = dynamic.model, passes[-1] if passes else {}
         passes.append(dict(model.values))
         if all(abs(before.get(name, np.inf) - value) <= _AGREED * abs(value) for name, value in passes[-1].items()):
@@ -234,7 +234,11 @@ def _springpot_warning(data: PreparedCampaign, static: FitResult) -> str:
 
 
 def _fit_step(
-    data: PreparedCampaign, tests: Sequence[MeasuredTest], effects: Sequence[str], fixed: Mapping[str, float]
+    data: PreparedCampaign,
+    tests: Sequence[MeasuredTest],
+    effects: Sequence[str],
+    fixed: Mapping[str, float],
+    start: Model | None = None,
 ) -> FitResult:
     """Fit one step of the paper's procedure with lmfit.
 
@@ -243,9 +247,10 @@ def _fit_step(
         tests: tests to fit.
         effects: names of the effects of the model.
         fixed: values of parameters that this step keeps fixed, by name [SI].
+        start: model of the last pass, from which the fit starts; None to start from values estimated from the tests.
     """
-    problem = data.problem(data.starting_model(effects, tests, fixed), tests, fixed)
-    return estimate(problem, robust=data.robust, lmfit=True)
+    model = start.with_values(fixed) if start else data.starting_model(effects, tests, fixed)
+    return estimate(data.problem(model, tests, fixed), robust=data.robust, lmfit=True)
 
 
 def _with_campaign(
