@@ -11,7 +11,6 @@ from bushfit.commands.fit import prepare_tests
 from bushfit.diagnosis.families import FittedFamily, fit_families
 from bushfit.diagnosis.fits import result_of
 from bushfit.effects import Level
-from bushfit.fitting.assess import lack_of_fit
 from bushfit.geometry import Specimen
 from bushfit.model.result import Result
 from bushfit.prediction.parameter_comparison import holm
@@ -48,8 +47,8 @@ def fit_campaign_families(
     adjusted = iter(holm([family.p for family in families if family.p is not None]))
     families = [family if family.p is None else replace(family, p=next(adjusted)) for family in families]
     results = [result_of(family.fit, data.bounds, model.effects, rig=campaign.rig) for family in families]
-    first, notes = families[0].fit, list[str]()
-    if lack_of_fit(first.model, data_sets, len(first.names)) is None:
+    notes = list[str]()
+    if results[0].model_error is None:
         notes.append("the first family meets these tests within their noise: the tests need no other family")
     if unlikely:
         percent = number(100.0 * sum(unlikely.values()), 2)

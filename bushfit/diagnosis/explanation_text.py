@@ -151,4 +151,6 @@ def format_amount(name: str, result: Result) -> str:
     value_text, *ends = format_aligned([factor * x for x in (value, *(interval or ()))], 3)
     quantity, _, _ = (amount.meaning or amount.name).partition(" (")
     text = f"{quantity}: {f'{value_text} {unit}'.removesuffix(' -').removesuffix(' 1')}"
+    if end := amount.reached_bound(value):
+        return f"{text} (at its {end}imum)"
     return f"{text} (95 % interval {ends[0]} to {ends[1]})" if ends else text

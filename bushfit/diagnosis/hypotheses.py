@@ -313,7 +313,7 @@ def mean_parameters(hypotheses: Sequence[Hypothesis], names: Sequence[str]) -> t
         names: names of the k parameters.
 
     Returns:
-        Means [SI], and covariance within and between the hypotheses.
+        Means [SI]; and covariance, within and between the hypotheses, of the parameters that are not at a bound in all.
     """
     log_posteriors = np.array([hypothesis.log_posterior for hypothesis in hypotheses])
     near = np.flatnonzero(log_posteriors > log_posteriors.max() - _NEAR).tolist()
@@ -328,4 +328,5 @@ def mean_parameters(hypotheses: Sequence[Hypothesis], names: Sequence[str]) -> t
         known = covariance.restricted(names)
         indices = [names.index(name) for name in known.names]
         matrix[np.ix_(indices, indices)] += weight * known.matrix
-    return dict(zip(names, mean.tolist(), strict=True)), Covariance(tuple(names), matrix)
+    determined = [name for _, covariance in pairs for name in covariance.names]
+    return dict(zip(names, mean.tolist(), strict=True)), Covariance(tuple(names), matrix).restricted(determined)

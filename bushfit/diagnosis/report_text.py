@@ -31,7 +31,7 @@ from bushfit.diagnosis.record import Diagnosis, NamedCause
 from bushfit.diagnosis.rig_shares import with_rig_alternatives
 from bushfit.diagnosis.search import Search
 from bushfit.diagnosis.verdict import LEVELS, NAMELESS, Composition, Finding, decide_verdict
-from bushfit.effects import get_effect, qualified_name
+from bushfit.effects import get_effect, get_parameter, qualified_name
 from bushfit.effects.mistakes import get_mistake
 from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.fitting.preparation import split_by_kind, with_gain_weighting
@@ -364,6 +364,9 @@ class DiagnosisWriter:
             rig=search.data.campaign.rig,
             fixed=closing.known,
         )
+        added = {name: value for name, value in fitted.model.values.items() if name not in base.model.values}
+        ends = {name: end for name, value in added.items() if (end := get_parameter(name).reached_bound(value))}
+        fitted = replace(fitted, at_bound={**fitted.at_bound, **ends})
         odds = explanation_odds(self.finding)
         result = with_rig_alternatives(odds.averaged(fitted), self.hypotheses, base)
         amounts = filter(None, (format_amount(entry.name, result) for entry in entries))

@@ -15,7 +15,7 @@ from bushfit.diagnosis.record import Diagnosis, DiagnosisSettings
 from bushfit.diagnosis.report_text import DiagnosisWriter
 from bushfit.diagnosis.search import Search
 from bushfit.diagnosis.verdict import decide_verdict
-from bushfit.effects import get_effect, place_suffix, qualified_name
+from bushfit.effects import effect_name_of, get_effect, place_suffix, qualified_name
 from bushfit.effects.mistakes import get_candidate, get_mistake
 from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.errors import FitError
@@ -128,6 +128,8 @@ def _initial_fit(
             amount = (effect := get_effect(name)).amount
             initial_values = {} if effect.replaces else {qualified_name(effect, amount): amount.value_at_share(0.1)}
             model = model.with_effect(name, initial_values)
+    stated_values = data.given_values.items()
+    model = model.with_values({name: value for name, value in stated_values if effect_name_of(name) in settings.adopt})
     outliers: tuple[Outlier, ...] = ()
     if data.robust:
         robust = estimate(FitProblem.with_fixed(model, data_sets, fixed, data.bounds), robust=True)

@@ -17,6 +17,7 @@ Notes:
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
@@ -103,6 +104,13 @@ class Parameter:
     def value_at_share(self, share: float) -> float:
         """Value whose distance from the neutral value (0 if None) is a share of the typical distance."""
         return (self.neutral or 0.0) + share * self.typical
+
+    def reached_bound(self, value: float) -> Literal["min", "max"] | None:
+        """Bound that a value is at: nearer than a thousandth of the fitted coordinate's unit; None between the bounds."""
+        low, high = self.bounds
+        low, point, high = (math.log(x) if self.log else x / self.typical for x in (low, value, high))
+        near = 1e-3 * min(high - low, 1.0)
+        return "min" if point - low < near else "max" if high - point < near else None
 
 
 @dataclass(frozen=True, eq=False)

@@ -88,10 +88,12 @@ def with_excess_errors(
         tests.
     """
     found, error = with_model_error(plain_fit, bounds, rig)
-    if error or not found.names:
-        text = f"the model misses the tests by {number(100.0 * error.rms, 2)} %" if error else ""
+    if error:
+        size = max(error.rms, *(test.model_error for test in found.problem.tests))
         rest = "; parameters are the closest fit, and their intervals include this misfit"
-        return found, error, [text + rest] if error else []
+        return found, error, [f"the model misses the tests by {number(100.0 * size, 2)} %{rest}"]
+    if not found.names:
+        return found, None, []
     errors = level_errors(found.problem.tests, found.residual, found.jacobian, largest_error(rig))
     if errors.freedom and any(errors.error):
         found = refit(errors)

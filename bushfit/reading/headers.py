@@ -53,10 +53,10 @@ ALL_COLUMNS = {
 }
 #: Roles with a common property, in a fixed order, by property (see words.toml).
 ROLE_SETS = {kind: dict.fromkeys(roles).keys() for kind, roles in WORDS["role_sets"].items()}
-#: Names of columns that assign rows to tests, by what they contain: direction, specimen_number or run.
+#: Names of columns that assign rows to tests, by what they contain: direction, specimen_number, part_number or run.
 ROW_COLUMNS = {
     **WORDS["rows"],
-    "specimen_number": WORDS["above"]["specimen_number"],
+    **{key: WORDS["above"][key] for key in ("specimen_number", "part_number")},
     "run": [*SWEEP_COLUMNS["repeat"], "block"],
 }
 #: Convention by which an amplitude is stated.

@@ -130,6 +130,8 @@ def find_labels(table: Table) -> Mapping[str, tuple[int, Sequence[str]]]:
                 named = [str(direction or text) for direction, text in zip(directions, texts.distinct, strict=True)]
                 texts = ColumnTexts(named, texts.codes)
             labels[role] = (index, texts.per_row())
+    if "part_number" in labels:
+        labels.setdefault("specimen_number", labels.pop("part_number"))
     return labels
 
 

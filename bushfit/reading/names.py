@@ -113,6 +113,7 @@ class Labels:
         quantities: quantities that may be the amplitude or frequency of the test.
         direction: direction of the bushing; None if it is not named.
         temperature, preload, date, operator, specimen_number: values for these keys of a campaign, as texts.
+        part_number: number of the part, which replaces `specimen_number` above a table if that is not stated.
         sampling: sampling rate or interval of a record as its number and unit, separated by a blank.
         convention: convention of the amplitudes in the table.
     """
@@ -124,6 +125,7 @@ class Labels:
     date: str | None = None
     operator: str | None = None
     specimen_number: str | None = None
+    part_number: str | None = None
     sampling: str | None = None
     convention: AmplitudeConvention | None = None
 
@@ -200,7 +202,8 @@ def labels_above(lines: Iterable[Line]) -> Labels:
     lines = list(lines)
     conventions = {found for line in lines if (found := _convention_in_line(line))}
     convention = conventions.pop() if len(conventions) == 1 else None
-    return reduce(or_, map(_label_in_line, lines), Labels(convention=convention))
+    labels = reduce(or_, map(_label_in_line, lines), Labels(convention=convention))
+    return labels | Labels(specimen_number=labels.part_number)
 
 
 def labels_and_text_above(lines: Sequence[Line]) -> Labels:
@@ -240,7 +243,7 @@ def _label_in_line(line: Line) -> Labels:
     name, unit = units.split_header(cells[0])
     values: dict[str, Any] = {}
     key, forms = _KEY_OF.get(plain(name)), (cells[1], " ".join(cells[1:3]), f"{cells[1]} {unit or ''}")
-    if key in ("date", "operator", "specimen_number"):
+    if key in ("date", "operator", "specimen_number", "part_number"):
         is_value = len(cells[1]) <= _LONGEST_VALUE and plain(cells[1]) not in _KEY_OF  # else a row of headers
         values = {key: cells[1]} if is_value else {}
         return Labels(**values)

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from bushfit.diagnosis.document import EffectEntry
+from bushfit.effects import get_parameter
 from bushfit.model.result import Result
 from bushfit.units import display_unit, format_aligned
 
@@ -85,5 +86,7 @@ def effect_sizes(effect: EffectEntry) -> list[tuple[str, str, str]]:
     for name, size in effect["parameters"].items():
         unit, factor = display_unit(size["unit"], 1.0, size["value"])
         value, *ends = format_aligned([factor * x for x in (size["value"], *(size["ci95"] or ()))], 4, minimum_digits=2)
-        rows.append((name, f"{value} {unit}".removesuffix(" -"), " to ".join(ends)))
+        end = get_parameter(name).reached_bound(size["value"])
+        at_end = f" (at {end})" if end else ""
+        rows.append((name, f"{value} {unit}".removesuffix(" -") + at_end, " to ".join(ends)))
     return rows

@@ -114,11 +114,15 @@ def test_its_own_model_is_consistent_and_predicts_without_the_rig(bushfit, found
     assert "inertia" in bushfit("predict", model, "-o", tmp_path / "predicted", "--no-plots").stderr
 
 
-def test_options_reach_the_workflow(bushfit, tmp_path):
+def test_options_reach_the_workflow(bushfit, work, tmp_path):
     for options in (("--tolerance", "50 %"), ("--adopt", "inertia")):
         run = bushfit("diagnose", CAMPAIGN, *options, "-o", tmp_path / "x", "--force", "--json", "--no-plots")
         assert json.loads(run.stdout)["verdict"] == "consistent"
     assert document(tmp_path / "x" / "model.json")["effects"] == [*BASE, "inertia"]
+    stated = '\n[fit."inertia.mass"]\nvalue = "70 g"\nvary = false\n'  # as weighed
+    (work / "case_001/weighed.toml").write_text((work / CAMPAIGN).read_text() + stated)
+    bushfit("diagnose", "case_001/weighed.toml", "--adopt", "inertia", "-o", tmp_path / "weighed", "--no-plots")
+    assert document(tmp_path / "weighed/model.json")["parameters"]["inertia.mass"]["value"] == pytest.approx(0.07)
 
 
 def test_a_clean_campaign(bushfit, tmp_path):

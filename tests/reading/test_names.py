@@ -69,6 +69,7 @@ def test_lines_above_a_table_and_the_name_before_the_headers():
         "Frequency\t10\tHz",
         ["Vorlast [kN]", 2.0],
         "Temperatures were kept: see the log of the chamber, please",
+        "Part no.: RB-204",
         ["Serial number", 17.0],
         "Amplitude: large",
     ]
