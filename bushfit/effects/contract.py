@@ -106,7 +106,7 @@ class Parameter:
         return (self.neutral or 0.0) + share * self.typical
 
     def reached_bound(self, value: float) -> Literal["min", "max"] | None:
-        """Bound that a value is at: nearer than a thousandth of the fitted coordinate's unit; None between the bounds."""
+        """Bound that a value is at, within a thousandth of the fitted coordinate; None between the bounds."""
         low, high = self.bounds
         low, point, high = (math.log(x) if self.log else x / self.typical for x in (low, value, high))
         near = 1e-3 * min(high - low, 1.0)
