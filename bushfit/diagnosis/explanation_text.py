@@ -86,7 +86,7 @@ def explanation_odds(finding: Finding) -> Odds:
         fits.append((fit.model, misfit_covariance(fit)) if fit else None)
     pairs = tuple(zip(sentences, (composition.probability for composition in compositions), strict=True))
     labels = tuple(composition.label for composition in compositions)
-    return Odds(finding.nothing, pairs, tuple(fits), labels, finding.verdict in ("ambiguous", "partly"))
+    return Odds(finding.nothing, pairs, tuple(fits), labels)
 
 
 def list_candidates(

@@ -24,7 +24,7 @@ from bushfit.fitting.problem import FitResult
 from bushfit.geometry import Place
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
-from bushfit.model.result import Alternative, Result
+from bushfit.model.result import Result
 from bushfit.prediction.caveats import warnings_of
 from bushfit.validation import to_json_data
 
@@ -114,15 +114,12 @@ class Odds:
         fits: fitted model of each explanation, with its covariance; None for the reported explanation, and for an
             explanation that was not fitted.
         labels: names of the effects, mistakes and faults of each explanation, joined by " + ".
-        are_alternatives: True if predictions must allow for `fits` too, because the tests cannot decide between the
-            explanations or because only a part of the gap is explained.
     """
 
     nothing: float
     explanations: tuple[tuple[str, float], ...] = ()
     fits: tuple[tuple[Model, Covariance] | None, ...] = ()
     labels: tuple[str, ...] = ()
-    are_alternatives: bool = False
 
     def averaged(self, result: Result) -> Result:
         """Widen the uncertainty of a result by the probability of other explanations.
@@ -132,13 +129,13 @@ class Odds:
 
         Returns:
             The result with a larger covariance: for each other explanation, the squared difference of its parameters
-            times its probability is added. If `are_alternatives`, the result also lists the other models.
+            times its probability is added.
 
         Notes: nothing is added for parameters that are not comparable: those at a bound in the other fit, those divided
         by such a parameter, and those of a branch that an effect replaces.
         """
         cov, current = result.covariance, result.model.values
-        matrix, alternatives = cov.matrix.copy(), list[Alternative]()
+        matrix = cov.matrix.copy()
         for (_, probability), fit in zip(self.explanations, self.fits, strict=True):
             if fit is None:
                 continue
@@ -147,9 +144,7 @@ class Odds:
             other_law = any(effect.replaces for effect in model.records if effect.name not in result.model.effects)
             if not other_law and {*cov.names} & {*model.values} <= {*covariance.names}:
                 matrix += (1.0 - self.nothing) * probability * np.outer(difference, difference)
-            if self.are_alternatives:
-                alternatives.append(Alternative(model, (1.0 - self.nothing) * probability, covariance))
-        return replace(result, covariance=replace(cov, matrix=matrix), alternatives=tuple(alternatives))
+        return replace(result, covariance=replace(cov, matrix=matrix))
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,7 @@ from bushfit.diagnosis.locate import find_regions
 from bushfit.diagnosis.next_test import MEASURE_AGAIN, deciding_test
 from bushfit.diagnosis.priors import LARGEST_CLOSED_GAP, NAMED
 from bushfit.diagnosis.record import Diagnosis, NamedCause
-from bushfit.diagnosis.rig_shares import with_rig_alternatives
+from bushfit.diagnosis.rig_shares import with_alternatives
 from bushfit.diagnosis.search import Search
 from bushfit.diagnosis.verdict import LEVELS, NAMELESS, Composition, Finding, decide_verdict
 from bushfit.effects import get_effect, get_parameter, qualified_name
@@ -368,7 +368,7 @@ class DiagnosisWriter:
         ends = {name: end for name, value in added.items() if (end := get_parameter(name).reached_bound(value))}
         fitted = replace(fitted, at_bound={**fitted.at_bound, **ends})
         odds = explanation_odds(self.finding)
-        result = with_rig_alternatives(odds.averaged(fitted), self.hypotheses, base)
+        result = with_alternatives(odds.averaged(fitted), self.hypotheses, base, search.settings.tolerance)
         amounts = filter(None, (format_amount(entry.name, result) for entry in entries))
         rest = [f"the rest: {' and '.join(remainder)}"] if remainder else []
         return Diagnosis(

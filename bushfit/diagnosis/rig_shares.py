@@ -1,4 +1,4 @@
-"""Alternatives to a smooth correction: the same measured stiffness, with a part of it taken for effects of the rig."""
+"""Alternatives to the model of a diagnosis: the same tests, with a part of the gap taken for effects of the rig."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 from scipy.linalg import block_diag
 from scipy.special import softmax
 
+from bushfit.diagnosis.fits import misfit_covariance
 from bushfit.diagnosis.hypotheses import Hypothesis, mean_parameters
 from bushfit.effects import get_effect, qualified_name
 from bushfit.effects.contract import Array, Level, RubberConditions
@@ -20,43 +21,47 @@ from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
 from bushfit.model.result import Alternative, Result
 
-#: Least probability of an alternative; chosen for time: in a mixture, a rarer one moves no 95 % band.
-_LEAST = 0.01
+#: Least probability of an alternative: beyond each end of a 95 % band are 2.5 %.
+_LEAST = 0.025
 #: Iterations for a correction with which a model keeps its stiffness; each reduces a change of 5 % twentyfold.
 _ITERATIONS = 3
 
 
-def with_rig_alternatives(result: Result, hypotheses: Sequence[Hypothesis], base: FitResult) -> Result:
-    """Add alternative models in which effects of the rig cause a part of a result's smooth correction.
+def with_alternatives(result: Result, hypotheses: Sequence[Hypothesis], base: FitResult, tolerance: float) -> Result:
+    """Add the models that the tests do not rule out beside the model of a result.
 
-    A correction closes the gap between model and tests, whatever its cause. In the car, effects of the rubber and the
-    component remain, and effects of the rig do not. So hypotheses are grouped by their effects of the rig, and each
-    group gives one model that has these effects and the same stiffness in the tests as the result.
+    Models with different effects of the rubber predict nearly the same in the tested range, because the rubber is the
+    same in the car; the rig is not in the car. So hypotheses are grouped by their effects of the rig, and each group
+    gives one model: its most probable fit, or, if a smooth correction closes the gap whatever its cause, a model with
+    the measured stiffness of the result.
 
     Args:
-        result: result; unchanged if its model has no smooth correction.
+        result: result of the diagnosis.
         hypotheses: all hypotheses about the gap.
         base: starting model, fitted to the tests.
+        tolerance: relative change of |K| up to which an explanation is neglected.
 
     Returns:
         The result with these alternatives and their probabilities. The remaining probability is that of the result's
         own effects of the rig.
     """
-    if not result.model.unnamed:
-        return result
     shares = softmax([hypothesis.log_posterior for hypothesis in hypotheses]).tolist()
     probability: dict[frozenset[str], float] = defaultdict(float)
     members: dict[frozenset[str], list[Hypothesis]] = defaultdict(list)
     for hypothesis, share in zip(hypotheses, shares, strict=True):
         effects = _of_rig(hypothesis.effects)
         probability[effects] += share
-        if hypothesis.refitted and not hypothesis.claim:
+        if hypothesis.refitted and not hypothesis.claim and hypothesis.change > tolerance:
             members[effects].append(hypothesis)
     current = _of_rig(result.model.effects) - {*base.model.effects}
     places = {str(test.direction): test.direction for test in base.data_sets}
     alternatives = []
     for effects, share in probability.items():
         if effects == current or share < _LEAST or not members[effects]:
+            continue
+        if not result.model.unnamed:
+            fit = members[effects][0].state.plain
+            alternatives.append(Alternative(fit.model, share, misfit_covariance(fit)))
             continue
         names = [qualified_name(effect, p) for effect in map(get_effect, sorted(effects)) for p in effect.parameters]
         amounts, known = mean_parameters(members[effects], names)

@@ -275,12 +275,15 @@ class Discrepancy:
 def averaged(processes: Sequence[Discrepancy]) -> Unnamed:
     """Average several Gaussian processes of a model's error, weighted by likelihood, into one correction of the model.
 
-    Nodes and groups are those of the likeliest process; lengths are geometric means. The size has few degrees of
-    freedom, so standard deviations are enlarged until a normal 95 % interval is as wide as that of Student's t.
+    Only processes with the groups of the likeliest are averaged: in one group, two directions cannot have different
+    errors at the same strain. Lengths are geometric means. Few degrees of freedom determine the size, so standard
+    deviations are enlarged until a normal 95 % interval is as wide as that of Student's t.
 
     Returns:
         Correction at the nodes, with its standard deviation, both relative to the stiffness.
     """
+    best = max(processes, key=lambda process: process.best[0])
+    processes = [process for process in processes if process.groups == best.groups]
     gains = np.array([process.best[0] for process in processes])
     share = np.exp(gains - gains.max())
     counted = np.flatnonzero(share > _COUNTS).tolist()
@@ -296,7 +299,7 @@ def averaged(processes: Sequence[Discrepancy]) -> Unnamed:
     error = wider * np.sqrt(np.tensordot(share, np.square(errors) + deviations, 1))
     lengths = np.exp(share @ np.log([processes[i].lengths for i in counted]))
     size = wider * float(np.exp(share @ np.log([processes[i].best[1] for i in counted])))
-    best, patches = processes[int(gains.argmax())], []
+    patches = []
     for group, nodes in zip(best.groups, best.nodes, strict=True):
         lists = (mean[nodes].real, mean[nodes].imag, *error[:, nodes])
         frequency, strain, *kelvin = (tuple(axis[nodes].tolist()) for axis in best.tests.conditions)

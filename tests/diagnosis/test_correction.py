@@ -157,6 +157,18 @@ def test_bands_hold_each_model_that_may_be_right(measured):
     np.testing.assert_array_equal(predict(again, Direction.RADIAL, FREQUENCIES, AMPLITUDES).stiffness.low, band.low)
 
 
+def test_bands_of_a_consistent_campaign_hold_what_the_rig_may_have(measured, paper_model):
+    """A sleeve that takes 1 % off the radial stiffness: probably there, but nothing may be missing as well."""
+    soft = {"compliance": 2.2e-9}
+    found = asked(measured({"sleeve_compliance": soft}))
+    assert found.verdict == "consistent"
+    assert any("sleeve_compliance" in each.model.effects for each in found.result.alternatives)
+    band = predict(found.result, Direction.RADIAL, FREQUENCIES, AMPLITUDES).stiffness
+    sleeve = paper_model.with_effect("sleeve_compliance", {"sleeve_compliance.compliance": soft["compliance"]})
+    for truth in (radial(paper_model), radial(sleeve)):
+        assert np.mean((band.low <= truth) & (truth <= band.high)) > 0.9
+
+
 @pytest.mark.slow
 def test_bands_hold_the_truth_whichever_it_is(measured, paper_model):
     """Of the campaigns that are told to be ambiguous; simulated, three effects, five seeds each: a bushing that is
