@@ -166,5 +166,5 @@ def _validity(correction: Unnamed, whole: FitResult) -> str:
     )
     misfit = max((region.excess for region in find_regions(whole) if region.kind == "loop"), default=0.0)
     stays = f" (the form of loops still differs by {number(misfit, 2)} times the noise)" if misfit else ""
-    loops = f", of loops the first harmonic only{stays}" if split_by_kind(whole.data_sets)[0] else ""
-    return f"valid only between these tests ({patches}){loops}, and for this bushing"
+    loops = f"; in loops, it changes the first harmonic only{stays}" if split_by_kind(whole.data_sets)[0] else ""
+    return f"valid only for this bushing and between these tests ({patches}){loops}"

@@ -149,7 +149,7 @@ def read_comparison(document: Mapping[str, Any], file: Path | None = None) -> Co
     families = [family.label for family in comparison.families or ()]
     is_complete = others and len(set(labels)) == len(labels) and pairs == [(first, label) for label in others]
     if not is_complete or len(places) != 1 or places == {()} or families not in ([], labels):
-        rule = "each result but the first compared with the first, at the same places"
+        rule = "each further result compared with the first, in the same directions and specimens"
         raise ModelError("the results do not fit together", file=file, place="pairs", expected=rule)
     return comparison
 
