@@ -23,7 +23,11 @@ Record = tuple[str, Callable[[click.Context, dict[str, Any]], Any]]
 
 
 class Option(click.Option):
-    """Option with a heading in its command's help and, if it is part of a record, the argument for the record."""
+    """Option of a command, with its heading in the help text.
+
+    An option of a group is not passed to the command's function by itself: `record` names the argument that collects
+    the values of the group, and the function that makes it from these values.
+    """
 
     heading: str | None = None
     record: Record | None = None
@@ -42,8 +46,8 @@ def option(usage: str, words: str | None = None, **more: Any) -> Parameter:
     """Create an option of a command.
 
     Args:
-        usage: names, perhaps the name of the Python argument, and the placeholder of the value in capitals, such as
-            "-o --output DIR"; a flag has no placeholder.
+        usage: names of the option, an optional name of the Python argument, and the placeholder of the value in
+            capitals, such as "-o --output DIR"; a flag has no placeholder.
         words: help text, which ends with the default in brackets; None if the option shares the text of the next
             option.
         **more: further arguments of click.option; an option with `multiple=True` says that it may be given again.
@@ -74,7 +78,7 @@ class Command(click.Command):
     """
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Parse the command line, and collect the values of options that have a record in one argument."""
+        """Parse the command line, and combine the options of each group with a `record` into one argument."""
         rest, records = super().parse_args(ctx, args), dict[Record, dict[str, Any]]()
         for parameter in self.params:
             if (record := getattr(parameter, "record", None)) and parameter.expose_value:
@@ -133,7 +137,7 @@ def add_parameters(function: Function, *parameters: Parameter) -> Function:
 
 
 def option_group(heading: str, *parameters: Parameter, record: Record | None = None) -> Parameter:
-    """Group options under a heading of the help, in the given order; a dataclass, `record`, collects their values."""
+    """Group options under a heading of the help, in the given order; `record` makes one argument of them."""
 
     def decorate(function: Function) -> Function:
         before = len(getattr(function, "__click_params__", ()))

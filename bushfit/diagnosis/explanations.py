@@ -48,10 +48,10 @@ class Group:
 
     @property
     def scaled(self) -> Array:
-        """Changes of all n residuals for the c columns, scaled for the prior of their amounts, (c, n).
+        """Changes of all n residuals by each of the c columns, (c, n), scaled so that one prior suits all amounts.
 
-        If only one of the columns acts, each is divided by its relative change of |K|, so that an amount of 1 changes
-        |K| by 100 %. A column that does not change |K| becomes zero. Columns that act together are not scaled.
+        If only one of the columns acts, each is divided by its relative change of |K|: an amount of 1 then changes |K|
+        by 100 %. A column that does not change |K| becomes zero. Columns that act together are not scaled.
         """
         if self.act_together:
             return self.whole

@@ -21,10 +21,10 @@ AT_ONCE = 4_000_000
 
 @dataclass(frozen=True, eq=False)
 class RigRows:
-    """Changes X of the residuals, with inner products X^T S^-1 Y; S is the covariance by scatter and errors of the rig.
+    """Changes of the residuals by m causes, to compute inner products in which errors of the rig have less weight.
 
     Args:
-        rows: m changes of the n residuals, (m, n).
+        rows: change X of the n residuals by each of m causes, such as explanations of a gap, (m, n).
         rig: errors of the rig.
     """
 
@@ -33,10 +33,10 @@ class RigRows:
 
     @cached_property
     def shared(self) -> Array:
-        """Inner products of the rows with the errors of the rig, weighted by the scatter only.
+        """Inner products of the m changes with the rig's errors, weighted by the scatter only.
 
         Returns:
-            Products for each size of the scatter, each block of residuals with common errors and each of its w errors,
+            Products for each size of the scatter, each block of residuals with common errors, and each of its w errors,
             (scatters, blocks, w, m).
         """
         weights, kernels = self.rig.weights[0], self.rig.kernels[0]
@@ -47,10 +47,10 @@ class RigRows:
         return shared
 
     def inner(self, other: RigRows, combinations: Array) -> Array:
-        """Inner products X^T S^-1 Y with the rows Y of another set.
+        """Inner products X^T S^-1 Y with the changes Y of another set.
 
         Args:
-            other: the other set, of m2 rows.
+            other: the other set, of m2 changes.
             combinations: indices of c assumed sizes of the rig's errors, see `RigErrors.combinations`, (c,).
 
         Returns:

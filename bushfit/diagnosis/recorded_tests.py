@@ -67,7 +67,7 @@ class RecordedTests:
 
     @cached_property
     def columns(self) -> ExplanationColumns:
-        """Residual columns of the explanations of a gap other than effects, beside the errors of the rig."""
+        """Changes of the residuals by faulty parts of the tests, smooth curves and a smooth deviation of the rubber."""
         return ExplanationColumns(self, self.errors)
 
     @cached_property

@@ -78,7 +78,7 @@ class RigErrors:
 
     @cached_property
     def log_weight(self) -> Array:
-        """Natural log of the prior probability of each case, (cases,)."""
+        """Natural log of the prior probability of each noise case (assumed sizes of the errors), (cases,)."""
         return np.array([case.log_weight for case in self.cases])
 
     @cached_property

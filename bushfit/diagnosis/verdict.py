@@ -166,7 +166,7 @@ def _verdict_on_parts(likely: Sequence[Composition], nothing: float, leads: Sequ
 
 
 def _leads(pairs: Sequence[tuple[Hypothesis, float]]) -> tuple[str, ...]:
-    """Effects of the most probable hypothesis that hypotheses with most of the total probability have in common.
+    """Effects of the most probable hypothesis whose total probability, over all hypotheses with them, is high.
 
     Args:
         pairs: hypotheses and their posterior probabilities, the most probable first.

@@ -126,7 +126,7 @@ def covariance(
 def _changes_by_noise(
     data_sets: Sequence[MeasuredTest], influence: Array, basis: Array
 ) -> dict[Hashable, tuple[Array, Array]]:
-    """Effects on the parameters' covariance of errors in the estimated noise variances, by identifier of the variance.
+    """Changes of the parameters' covariance by errors of the estimated noise variances, by name of the variance.
 
     Args:
         data_sets: tests of one fit.
@@ -134,8 +134,8 @@ def _changes_by_noise(
         basis: r orthogonal rows that span the Jacobian of the parameters of this fit, (r, n).
 
     Returns:
-        For each noise variance: change of the covariance if the variance rises by one standard error, and the
-        covariance added because the weights of the fit are wrong, (k, k) each.
+        For each noise variance: change of the covariance if the variance is larger by one standard error, and the
+        covariance that the then wrong weights of the fit add, (k, k) each.
     """
     unit, sums = basis / np.linalg.norm(basis[0]), dict[Hashable, list[Array]]()
     for test, rows in zip(data_sets, residual_slices(data_sets), strict=True):

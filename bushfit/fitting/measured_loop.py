@@ -380,10 +380,13 @@ class MeasuredLoop(MeasuredBase):
         return {(self.name, index): self.shared_errors.whiten(part) for index, part in enumerate(parts)}
 
     def extra_covariance(self, influence: Array) -> Array:
-        """Covariance of k parameter estimates due to errors that the weights of the residuals do not contain, (k, k).
+        """Covariance to add to that of k parameter estimates, for errors that the weights of the fit lack, (k, k).
 
         The gain error is added. The model error of the first harmonic is subtracted, because a smooth error of the
-        model includes it. `influence`: change of each estimate per unit of each whitened residual, (k, size).
+        model, which the fit adds separately, contains it.
+
+        Args:
+            influence: change of each estimate per unit of each whitened residual, (k, size).
         """
         first = self.model_error * _ERROR_SIZES[0] * self.force_changes(basis(self.phase, 1).T[1:])
         both = influence @ np.vstack((first, self.gain_error * self.gain_and_offset()[0])).T

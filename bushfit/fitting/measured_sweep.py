@@ -248,11 +248,13 @@ class MeasuredSweep(MeasuredBase):
         return self.covariance.noise_sensitivity(influence)
 
     def extra_covariance(self, influence: Array) -> Array:
-        """Covariance of k parameter estimates due to errors that the weights of the residuals do not contain, (k, k).
+        """Covariance to add to that of k parameter estimates, for errors that the weights of the fit lack, (k, k).
 
-        With a model error, the errors shared by runs and lines are added, and the independent model error is subtracted
-        because a smooth error includes it. `influence`: change of each estimate per unit of each whitened residual,
-        (k, 2 n).
+        If the fit assumes a model error, errors shared by runs and lines are added; the independent model error is
+        subtracted, because a smooth error of the model, which the fit adds separately, contains it.
+
+        Args:
+            influence: change of each estimate per unit of each whitened residual, (k, 2 n).
         """
         noise, whitened = self.covariance, self.model_errors.whiten(influence)
         lines = SharedErrors.of_groups(noise.line, noise.per_scatter, self.noise.level)

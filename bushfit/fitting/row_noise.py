@@ -146,8 +146,8 @@ def row_noise(residual: Array, settled: Array, cycles: int) -> tuple[RowNoise, f
     """Estimate correlation and size of the noise of the rows of a loop.
 
     Args:
-        residual: force without its harmonics [N or N m], (n,); of a single cycle without mean, first three and all odd
-            harmonics.
+        residual: force without its harmonics [N or N m], (n,); for a record of a single cycle, without its mean, its
+            first three and all odd harmonics.
         settled: residual without slow changes from one cycle to the next [N or N m], (n,).
         cycles: number of whole cycles in the rows.
 

@@ -102,7 +102,7 @@ class ModelInformation:
         return Information(remaining, self.squares * counts[:, None] - decrease)
 
     def total(self, counts: Array) -> Information:
-        """Fisher information of the prior and of all runs together, as a single choice.
+        """Fisher information of the prior and all runs together (one set of tests).
 
         Args:
             counts: number of runs of each candidate test, (tests,).

@@ -178,7 +178,7 @@ def _alike_runs(values: Floats, reach: Floats) -> Iterator[slice]:
 
 
 def _extend_span(span: SteadySpan, time: Floats, motion: Floats, before: float, after: float) -> SteadySpan:
-    """Extend a part of constant amplitude and rate by half a cycle on either side if the motion is periodic there.
+    """Extend a part of constant amplitude and rate by half a cycle at each end where the motion continues alike.
 
     Args:
         span: part of the record.
