@@ -1,5 +1,7 @@
 """Combine the blocks of a table (one below the other, side by side, or transposed) into one long table."""
 
+from __future__ import annotations
+
 import re
 from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from dataclasses import replace
@@ -7,6 +9,7 @@ from itertools import accumulate, groupby, islice, pairwise, zip_longest
 from typing import NamedTuple
 
 from bushfit import units
+from bushfit.geometry import Direction
 from bushfit.reading.headers import COUNTED, SWEEP_COLUMNS, Vocabulary, split_unit
 from bushfit.reading.layout import WITH_UNIT, Layout, Line, is_comment, is_row, is_summary_row, is_units_row
 from bushfit.reading.names import (
@@ -16,6 +19,7 @@ from bushfit.reading.names import (
     labels_and_text_above,
     labels_in_names,
     named_direction,
+    named_quantities,
 )
 from bushfit.reading.numerals import is_like_number, plainest_value
 from bushfit.reading.roles import CONDITIONS
@@ -49,6 +53,20 @@ class Segment(NamedTuple):
 
     above: list[Line]
     rows: list[Line]
+
+
+class Side(NamedTuple):
+    """Columns of one of several blocks side by side.
+
+    Args:
+        shared: indices of the columns that all blocks have in common.
+        columns: indices of the columns of the block.
+        title: title of the block, if its headers contain it.
+    """
+
+    shared: Sequence[int]
+    columns: Sequence[int]
+    title: str = ""
 
 
 def find_segments(
@@ -91,11 +109,12 @@ def combined(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> tuple
     """
     if isinstance(source, Channels) or len(layout.headers) < 2 or layout.headerless:
         return source, layout
-    sides = _find_sides(layout)
+    sides = _find_sides(layout) or _sides_by_direction(layout)
     if sides and (blocks := _side_by_side(source, layout, sides)):
-        shared = slice(0, sides[0].start)
-        headers, in_row = ((*row[shared], *row[sides[0]]) for row in (layout.headers, layout.units))
-        layout = replace(layout, headers=headers, units=in_row)
+        first = [*sides[0].shared, *sides[0].columns]
+        headers = [_split_direction(header)[0] if sides[0].title else header for header in layout.headers]
+        in_row = tuple(layout.units[index] for index in first)
+        layout = replace(layout, headers=tuple(headers[index] for index in first), units=in_row)
     elif isinstance(source, Text) and _is_one_block(source, layout):
         return source, layout
     else:
@@ -105,7 +124,9 @@ def combined(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> tuple
     titles = [block.above[-1].text if block.above else "" for block in blocks]
     labels = [_block_labels(block, title) for block, title in zip(blocks, titles, strict=True)]
     labels = list(accumulate(labels, _continued))
-    added = _label_columns(labels, titles if sides else [], vocabulary.roles(layout.headers))
+    known = vocabulary.roles(layout.headers)
+    added = _label_columns(labels, titles if sides else [], known)
+    added |= _named_columns(blocks, vocabulary, known | vocabulary.roles([*added]))
     numbers, content, width = list[int](), list[Sequence[str | float]](), len(layout.headers)
     for index, row in ((index, row) for index, block in enumerate(blocks) for row in block.rows):
         cells, texts = cells_of(row, layout.delimiter), [column[index] for column in added.values()]
@@ -115,7 +136,8 @@ def combined(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> tuple
     layout = replace(layout, headers=(*layout.headers, *added), units=(*layout.units, *[""] * len(added)))
     head = [line for line in source.head() if line.number < layout.header_line]
     in_rows = {header.partition(" ")[0] for header in added}.intersection(CONDITIONS)
-    above = [line for line in head if not _is_of_block(line, in_rows)]
+    of_titles = {line.number for block in blocks for line in block.above}
+    above = [line for line in head if not (line.number in of_titles if sides else _is_of_block(line, in_rows))]
     return _with_plain_cells(Sheet(source.sheet or "", content, above=above, numbers=numbers), layout)
 
 
@@ -158,31 +180,60 @@ def _is_one_block(source: Text, layout: Layout) -> bool:
     return not source.data[end:].translate(None, _NUMERIC + layout.delimiter.encode())
 
 
-def _find_sides(layout: Layout) -> list[slice]:
+def _find_sides(layout: Layout) -> list[Side]:
     """Columns of each of several blocks with equal headers and units; the blocks may share columns on their left."""
     columns = list(zip(layout.headers, layout.units, strict=True))
     first = next((column for column in columns if column[0] and columns.count(column) > 1), None)
     starts = [index for index, column in enumerate(columns) if column == first]
     sides = [[one for one in columns[start:end] if one[0]] for start, end in pairwise([*starts, len(columns)])]
     is_block = len(sides) > 1 and 1 < len(sides[0]) == len(dict(sides[0])) and all(side == sides[0] for side in sides)
-    return [slice(start, start + len(sides[0])) for start in starts] if is_block else []
+    return [Side(range(starts[0]), range(start, start + len(sides[0]))) for start in starts] if is_block else []
 
 
-def _side_by_side(source: RowSource, layout: Layout, sides: Sequence[slice]) -> list[Segment]:
+def _sides_by_direction(layout: Layout) -> list[Side]:
+    """Columns of each direction of a sweep whose headers differ in the word for the direction alone."""
+    split = [_split_direction(header) for header in layout.headers]
+    columns = {direction: [n for n, one in enumerate(split) if one[1] is direction] for _, direction in split}
+    shared = columns.pop(None, [])
+    names = [[split[index][0] for index in indices] for indices in columns.values()]
+    is_sweep = "frequency" in Vocabulary(SWEEP_COLUMNS).roles([layout.headers[index] for index in shared])
+    if not is_sweep or len(names) < 2 or len(names[0]) < 2 or any(one != names[0] for one in names):
+        return []
+    return [Side(shared, indices, str(direction)) for direction, indices in columns.items()]
+
+
+def _split_direction(header: str) -> tuple[str, Direction | None]:
+    """Split "K axial [N/mm]" into "K [N/mm]" and the direction; None for a header without a direction."""
+    words = header.split()
+    found = [word for word in words if named_direction([word])]
+    if len(found) != 1:
+        return header, None
+    return " ".join(word for word in words if word not in found), named_direction(found)
+
+
+def _side_by_side(source: RowSource, layout: Layout, sides: Sequence[Side]) -> list[Segment]:
     """Separate blocks of columns side by side, with or without titles above them.
 
     Blocks that share columns are separated only if their titles differ; otherwise the list is empty.
     """
     head = [line for line in reversed(source.head()) if line.number < layout.header_line]
     rows = [line for line in source.lines(layout.lines_before_data) if not is_comment(line.content, layout.delimiter)]
-    above, below = ([(line.number, cells_of(line, layout.delimiter)) for line in lines] for lines in (head, rows))
-    shared, blocks = slice(0, sides[0].start), list[Segment]()
-    for side in sides:
-        titles = [Line(number, str(cell)) for number, cells in above for cell in cells[side] if cell != ""]
-        data = [Line(n, [*cells[shared], *cells[side]]) for n, cells in below if any(c != "" for c in cells[side])]
-        blocks.append(Segment(titles[:1], data))
+    width = len(layout.headers)
+    above, below = (
+        [(line.number, [*cells_of(line, layout.delimiter), *[""] * width]) for line in lines] for lines in (head, rows)
+    )
+    blocks = list[Segment]()
+    for shared, columns, title in sides:
+        titles = [Line(number, str(cells[n])) for number, cells in above for n in columns if cells[n] != ""]
+        titles = [Line(layout.header_line, title)] if title else titles[:1]
+        data = [
+            Line(number, [cells[n] for n in (*shared, *columns)])
+            for number, cells in below
+            if any(cells[n] != "" for n in columns)
+        ]
+        blocks.append(Segment(titles, data))
     is_titled = len({title.text for block in blocks for title in block.above}) == len(blocks)
-    return blocks if is_titled or not sides[0].start else []
+    return blocks if is_titled or not sides[0].shared else []
 
 
 def _stacked_blocks(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> list[Segment]:
@@ -238,9 +289,8 @@ def _block_labels(block: Segment, title: str) -> Labels:
 
 
 def _continued(before: Labels, labels: Labels) -> Labels:
-    """Labels of a block after another: a stated condition applies until another one is stated."""
-    conditions = {key: getattr(labels, key) or getattr(before, key) for key in ("direction", *CONDITIONS)}
-    return replace(labels, **conditions)
+    """Labels of a block after another: all but its amplitude and frequency apply until others are stated."""
+    return replace(labels | before, quantities=labels.quantities)
 
 
 def _is_of_block(line: Line, conditions: set[str]) -> bool:
@@ -280,6 +330,29 @@ def _label_columns(labels: Sequence[Labels], parts: Sequence[str], roles: set[st
     if len(set(named)) > 1:
         columns["repeat" if named == parts and are_runs else "part"] = list(named)
     columns["block"] = [str(number) for number in range(1, len(labels) + 1)]
+    return columns
+
+
+def _named_columns(blocks: Sequence[Segment], vocabulary: Vocabulary, roles: set[str]) -> dict[str, list[str | float]]:
+    """Columns for the other quantities that the lines above all blocks state by name, if they differ.
+
+    Args:
+        blocks: blocks with the lines above them.
+        vocabulary: known column names.
+        roles: roles that have a column already.
+
+    Returns:
+        One number per block, by header.
+    """
+    stated = [dict(item for line in block.above for item in named_quantities(line).items()) for block in blocks]
+    columns: dict[str, list[str | float]] = {}
+    for name in stated[0] if all(stated) else ():
+        numbers, in_units = zip(*(block.get(name, ("", "")) for block in stated), strict=True)
+        header = f"{name} [{in_units[0]}]"
+        heading = vocabulary.heading(header)
+        is_known = heading is not None and heading.role in roles
+        if len(set(in_units)) == 1 < len(set(numbers)) and units.is_unit(in_units[0]) and name and not is_known:
+            columns[header] = [float(number) for number in numbers]
     return columns
 
 

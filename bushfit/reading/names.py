@@ -56,7 +56,11 @@ _TEMPERATURES = (-100.0, 300.0)
 #: Key of a campaign by each of its usual names above a table.
 _KEY_OF = {
     plain(name): key
-    for key, names in {**WORDS["above"], "direction": WORDS["rows"]["direction"]}.items()
+    for key, names in {
+        **WORDS["above"],
+        "direction": WORDS["rows"]["direction"],
+        "preload": SWEEP_COLUMNS["preload"],
+    }.items()
     for name in names
 }
 #: SI unit of the two keys for the time between rows.
@@ -67,6 +71,10 @@ _VOCABULARY = Vocabulary({role: SWEEP_COLUMNS[role] for role in ("frequency", "a
 _AFTER_KEY = re.compile(r"\t|;|:\s|:$|\s=\s|=|,(?!\d)|(?<=[^\W\d]),")
 #: Blank between a name and its value at the end of a line: "Sample rate 512 Hz".
 _BEFORE_VALUE = re.compile(r"\s+(?=\d[\d.,]*(?:\s*[^\W\d]\S*)?$)")
+#: Name and value with unit in a line: "1 V = 200 N", "Crosshead speed: 10 mm/min".
+_NAMED_QUANTITY = re.compile(
+    r"(?P<name>[^\t;,:=]*?)\s*[=:]\s*(?P<number>[+-]?\d+(?:[.,]\d+)?)\s*(?P<unit>[^\s\d,;]+(?:\s*/\s*[^\s\d,;]+)?)"
+)
 #: Decimal comma of a number at the start of a value.
 _COMMA = re.compile(r"^([+-]?\d+),(?=\d+(?!\d|[.,]\d))")
 #: Unit of a sampling rate in samples: "kS/s", "samples/s", "SPS".
@@ -266,6 +274,12 @@ def _label_in_line(line: Line) -> Labels:
             if fitting and (fitting[0] == "Hz") == (heading.role == "frequency"):
                 return Labels((StatedQuantity(number, number.split()[-1], True, heading.convention or convention),))
     return NO_LABELS
+
+
+def named_quantities(line: Line) -> dict[str, tuple[str, str]]:
+    """Number and unit of each quantity behind "=" or ":" in a line above a table, by its name."""
+    matches = _NAMED_QUANTITY.finditer(line.text)
+    return {match["name"].strip(' "#'): (match["number"].replace(",", "."), match["unit"]) for match in matches}
 
 
 def _is_quantity(text: str, unit: str) -> bool:

@@ -25,6 +25,7 @@ from bushfit.reading.headers import (
     parse_unit,
     split_unit,
 )
+from bushfit.reading.names import named_quantities
 from bushfit.reading.numerals import plainest_value
 from bushfit.reading.roles import OF_MOTION, of_motion, si_unit
 
@@ -33,8 +34,6 @@ if TYPE_CHECKING:
 
 #: Number above zero of a stated multiple of a unit, such as 200 N for the force of 1 V.
 _MULTIPLE = re.compile(r"^(?=[\d.]*[1-9])\d+\.?\d*(?=\s+[^\W\d_])")
-#: Quantity in a line above a table: "1 V = 200 N", "Crosshead speed: 10 mm/min".
-_QUANTITY = re.compile(r"[=:]\s*(\d+(?:[.,]\d+)?)\s*([^\s\d,;]+(?:\s*/\s*[^\s\d,;]+)?)")
 
 
 def si_column(table: Table, role: str, tested: Place, hint: str | None = None) -> Column:
@@ -171,9 +170,8 @@ def quantity_above(table: Table, unit: str) -> str | None:
     Returns:
         Number and unit as text; None if no quantity, or several, have the dimension of the SI unit `unit`.
     """
-    matches = (match for line in table.lines_above for match in _QUANTITY.finditer(line.text))
-    matches = (match for match in matches if units.is_compatible(match[2], unit))
-    texts = dict.fromkeys(f"{match[1].replace(',', '.')} {match[2]}" for match in matches)
+    found = (quantity for line in table.lines_above for quantity in named_quantities(line).values())
+    texts = dict.fromkeys(" ".join(quantity) for quantity in found if units.is_compatible(quantity[1], unit))
     return next(iter(texts)) if len(texts) == 1 else None
 
 

@@ -177,6 +177,11 @@ def _read_block(headers: Sequence[list[str]], rows: Sequence[Line], vocabulary: 
     meanings = {n: meanings[n] | across | _Meaning(stepped=stepped) for n in columns}
     if stepped is None or len(columns) < 2 or not all(meaning.level for meaning in meanings.values()):
         return []
+    names: dict[_Meaning, set[str]] = {}
+    for column, meaning in meanings.items():
+        names.setdefault(meaning, set()).add(headers[-1][column])
+    if any(len(texts) > 1 for texts in names.values()):
+        return []  # such as K axial and K radial, at the same level
     down = replace(down, stepped=_STEPPED[stepped == _STEPPED[0]])
     return [
         _WideColumn(meaning, down, [(row.number, row.content[0], row.content[n]) for row in rows])
