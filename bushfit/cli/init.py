@@ -16,7 +16,7 @@ import click
 from bushfit.cli.file_options import QUESTIONS, STATED, direction_error, metadata_options, options_named, value_type
 from bushfit.cli.options import command_called, flag, option, option_group, option_name
 from bushfit.cli.output import Output, with_output
-from bushfit.errors import BushfitError, CampaignError, MeasurementError, error_location, quote_path
+from bushfit.errors import BushfitError, CampaignError, MeasurementError, NoTestError, error_location, quote_path
 from bushfit.progress import track
 from bushfit.report.results import ResultFile, check_free
 from bushfit.units import parse_quantity
@@ -187,10 +187,10 @@ def inspect_sources(
         look = partial(inspect_source, source, is_sized=is_sized, is_asking=questions.enabled)
         try:
             inspection = questions.complete(source.test_options, look)
-        except click.UsageError as error:
+        except (click.UsageError, NoTestError) as error:
             if source.is_named:
                 raise
-            sentences.append(f"{source}: {error.message}")
+            sentences.append(f"{source}: {error.message if isinstance(error, click.UsageError) else error.problem}")
             continue
         if inspection.kind != "history":
             inspections.append(inspection)

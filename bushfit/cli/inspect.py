@@ -15,7 +15,7 @@ from rich.markup import escape
 from bushfit.cli.file_options import metadata_options, options_named
 from bushfit.cli.options import command_called
 from bushfit.cli.output import Output, with_output
-from bushfit.errors import BushfitError
+from bushfit.errors import BushfitError, NoTestError
 from bushfit.progress import track
 from bushfit.report import plots
 from bushfit.report.results import ResultFile
@@ -56,6 +56,12 @@ def command(files: tuple[Path, ...], test_options: Mapping[str, Any], output: Ou
         try:
             with options_named():
                 inspections.append(source.inspect())
+        except NoTestError as error:
+            if source.is_named:
+                errors.append(error)
+            else:
+                left_out = (*left_out, f"{source}: {error.problem} ({error.found})")
+                output.print(f"left out: {left_out[-1]}")
         except BushfitError as error:
             errors.append(error)
         else:

@@ -26,7 +26,7 @@ from bushfit.reading.instruments import word_for_part
 from bushfit.reading.labelled import same_text
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.levels import split_conditions
-from bushfit.reading.measurement import Loop, Sweep
+from bushfit.reading.measurement import FEWEST_LOOP_ROWS, Loop, Sweep
 from bushfit.reading.names import NO_LABELS, Labels, labels_above, labels_in_names
 from bushfit.reading.parts import open_file
 from bushfit.reading.roles import CONDITIONS
@@ -177,7 +177,7 @@ def split_rows(source: TestSource) -> tuple[list[TestSource], list[str]]:
     """
     test_options, tests, left_out = source.test_options, list[TestSource](), list[str]()
     try:
-        table, _ = recognize_table(source.file, source.without("direction", "specimen_number").test_options)
+        table, is_sweep = recognize_table(source.file, source.without("direction", "specimen_number").test_options)
         columns = dict(table.row_labels)
         if "run" in columns and "time" in table.roles:
             time = table.read({"time": table.roles["time"]}, fewest_rows=1)[0]["time"]
@@ -193,6 +193,9 @@ def split_rows(source: TestSource) -> tuple[list[TestSource], list[str]]:
     except BushfitError:  # which the inspection of the file reports
         return [source], []
     for texts, tests_at_levels in levels.items():
+        if "run" in columns and not is_sweep and (count := labels.count(texts)) < FEWEST_LOOP_ROWS:
+            left_out.append(f"{source}: {count} rows of run {', '.join(texts)} are too few for a loop")
+            continue
         keys: dict[str, Any] = dict(zip(columns, texts, strict=True))
         run: dict[str, Any] = {}
         if text := keys.pop("run", None):

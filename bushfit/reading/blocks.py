@@ -348,11 +348,13 @@ def _named_columns(blocks: Sequence[Segment], vocabulary: Vocabulary, roles: set
     columns: dict[str, list[str | float]] = {}
     for name in stated[0] if all(stated) else ():
         numbers, in_units = zip(*(block.get(name, ("", "")) for block in stated), strict=True)
-        header = f"{name} [{in_units[0]}]"
-        heading = vocabulary.heading(header)
-        is_known = heading is not None and heading.role in roles
-        if len(set(in_units)) == 1 < len(set(numbers)) and units.is_unit(in_units[0]) and name and not is_known:
-            columns[header] = [float(number) for number in numbers]
+        if not name or len(set(in_units)) > 1 or len(set(numbers)) == 1 or not units.is_unit(in_units[0]):
+            continue
+        heading = vocabulary.heading(f"{name} [{in_units[0]}]")
+        if heading is None:  # no numbers, because its unit says nothing about its role
+            columns[name] = [f"= {number} {in_units[0]}" for number in numbers]
+        elif heading.role in CONDITIONS and heading.role not in roles:
+            columns[f"{name} [{in_units[0]}]"] = [float(number) for number in numbers]
     return columns
 
 

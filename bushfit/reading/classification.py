@@ -21,6 +21,7 @@ from bushfit.reading.headers import (
     plain,
     plain_name,
     split_unit,
+    without_mean,
 )
 from bushfit.reading.inference import (
     AGREEMENT,
@@ -39,7 +40,7 @@ _ALIKE = 0.4
 #: Factor at the end of a name, outside of the unit: "K*/1000", "Amplitude x10".
 _FACTOR = re.compile(r"(?:/|\s[x×*])\s?(?!1$)\d+(?:[.,]\d+)?$")
 #: Number at the end of the name of one of several columns for a quantity: "K1", "Phase_2".
-_NUMBERED = re.compile(r"(.*?[^\d\s_])[\s_]?([12])")
+_NUMBERED = re.compile(r"(.*?[^\d\s_])[\s_]?(\d)")
 
 
 def classify(
@@ -105,6 +106,7 @@ def classify(
         notes += add_motion_as_amplitude(table, roles, stated_units)
     if "damping_coefficient" in roles and "stiffness" in roles and "stiffness" not in columns:
         notes += name_parallel_spring(roles)
+    notes += _columns_beside_mean(table, roles)
     stated = {*columns, *stated_units}
     _require_plain_names(table, {role: column for role, column in roles.items() if role not in stated})
     time = roles.get("time")
@@ -112,6 +114,23 @@ def classify(
     notes = [*table.layout.notes, *notes]
     clocks = frozenset({time.index} if time and is_clock else ())
     return replace(table, roles=roles, notes=tuple(notes), clocks=clocks)
+
+
+def _columns_beside_mean(table: Table, roles: Mapping[str, Column]) -> list[str]:
+    """Sentence on numbered columns, such as those of repeats, that are not read beside their mean."""
+    used = {index for column in roles.values() for index in column.indices}
+    stems = {without_mean(split_unit(column.header)[0]): column.header for column in roles.values()}
+    matches = ((header, _NUMBERED.fullmatch(split_unit(header)[0].strip())) for header in table.headers)
+    free = [
+        (header, stems[stem])
+        for index, (header, match) in enumerate(matches)
+        if match and index not in used and (stem := plain(match[1])) in stems
+    ]
+    means = dict.fromkeys(mean for _, mean in free)
+    return [
+        f'{", ".join(header for header, one in free if one == mean)} are left out beside their mean "{mean}"'
+        for mean in means
+    ]
 
 
 def _require_plain_names(table: Table, roles: Mapping[str, Column]) -> None:
@@ -135,7 +154,7 @@ def _require_plain_names(table: Table, roles: Mapping[str, Column]) -> None:
                 hint=f'if they are, name the column: columns = {{ {role} = "{roles[role].header}" }} in the campaign; '
                 f'otherwise write the factor into the unit, such as units = {{ {role} = "10^3 {roles[role].unit}" }}',
             )
-    stems = {"1": set[str](), "2": set[str]()}
+    stems = {str(number): set[str]() for number in range(10)}
     for header in table.headers:
         if match := _NUMBERED.fullmatch(split_unit(header)[0].strip()):
             stems[match[2]].add(match[1].casefold())

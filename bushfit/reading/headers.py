@@ -258,11 +258,11 @@ class Vocabulary:
             implied: AmplitudeConvention | None = "peak-to-peak" if bare in PEAK_TO_PEAK_NAMES else convention
             amplitudes = [word + "amplitude" for word in (bare, without_asides) if implied or (extreme and word)]
             amplitudes += ["amplitude"] * (bare in PEAK_TO_PEAK_NAMES) + [f"{bare}extreme"] * is_extreme
-            without_mean = plain(_MEANS.sub("", _folded(name)))
+            of_mean = without_mean(name)
             for word in (
                 bare,
                 without_asides,
-                *([without_mean] if ROLE_SETS["of_means"] & self._roles.get(without_mean, ()) else []),
+                *([of_mean] if ROLE_SETS["of_means"] & self._roles.get(of_mean, ()) else []),
                 *amplitudes,
                 *self._names_with_symbol(name, unit),
             ):
@@ -323,7 +323,7 @@ def fits(word: str, role: str, unit: str | None) -> bool:
 
 def is_angular(header: str, unit: str) -> bool:
     """Return True if a frequency column is angular (rad/s), by its unit, or by its header if the unit is 1/s."""
-    name = plain(header)
+    name = plain(_LOGARITHM.sub(r"\g<inner>", header, 1)) or plain(header)
     return units.is_compatible(unit, "rad/s") or (
         "hz" not in unit.lower()
         and any(name.startswith(plain(word)) for word in _ANGULAR)
@@ -370,6 +370,11 @@ def plain(name: str) -> str:
     """Normalise a name for comparison: only letters, digits and ' | *, in lower case without accents."""
     letters = re.sub(r"[^\w'|*]|_", "", _folded(name.translate(_FOOTNOTES).translate(_SPELLINGS)).replace("ß", "ss"))
     return letters.replace("ae", "a").replace("oe", "o").replace("ue", "u")
+
+
+def without_mean(name: str) -> str:
+    """Name in plain letters (see `plain`) without a word for the mean of several parts or repeats."""
+    return plain(_MEANS.sub("", _folded(name)))
 
 
 def plain_name(header: str) -> str:

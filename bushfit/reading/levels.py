@@ -11,7 +11,7 @@ from bushfit.errors import UnitError
 from bushfit.geometry import Direction, Motion, Place
 from bushfit.reading.headers import Column
 from bushfit.reading.labelled import column_texts
-from bushfit.reading.measurement import SAME_TEMPERATURE, Floats
+from bushfit.reading.measurement import FEWEST_LOOP_ROWS, SAME_TEMPERATURE, Floats
 from bushfit.reading.numerals import Numerals
 from bushfit.reading.preload import parse_preload
 from bushfit.reading.roles import CONDITIONS
@@ -25,8 +25,8 @@ from bushfit.units import CELSIUS, is_compatible, kelvin_scale, number, parse_te
 ONE_TEST = 5.0
 #: Smallest step between preloads of different tests, relative to the largest one; chosen: rubber relaxes by less.
 _PRELOAD_STEP = 0.1
-#: Smallest number of rows at a level: of a sweep as the user states it, and of a loop.
-_FEWEST_POINTS, _FEWEST_LOOP_ROWS = 3, 10
+#: Smallest number of rows at a level that the user states.
+_FEWEST_POINTS = 3
 
 
 @dataclass(frozen=True)
@@ -101,7 +101,7 @@ class Condition:
             UnitError: several preloads without a unit.
         """
         groups, keys = self.groups(rows), [numbers[rows] for numbers in points]
-        if self.is_loop and min(group.size for group in groups) < _FEWEST_LOOP_ROWS:
+        if self.is_loop and min(group.size for group in groups) < FEWEST_LOOP_ROWS:
             return [rows]
         if self.unit == "degC":
             return groups if np.ptp(self.values[rows]) > ONE_TEST else [rows]

@@ -11,7 +11,7 @@ from bushfit.reading.finding import find_table
 from bushfit.reading.headers import LOOP_COLUMNS, Column
 from bushfit.reading.labelled import Rows, note_not_understood
 from bushfit.reading.levels import mean_temperature, rows_of_test
-from bushfit.reading.measurement import Floats, Loop
+from bushfit.reading.measurement import FEWEST_LOOP_ROWS, Floats, Loop
 from bushfit.reading.parts import OpenedFile
 from bushfit.reading.preload import parse_preload
 from bushfit.reading.si_columns import quantity_above, si_column
@@ -24,8 +24,6 @@ from bushfit.reading.times import DAY, are_day_numbers, spread
 _LATEST_SECOND = 1e11
 #: Relative difference up to which the step of a time agrees with a sampling rate; chosen: steps are rounded.
 _RATE_AGREEMENT = 0.02
-#: Smallest number of rows of a loop; chosen: fewer do not show its shape.
-_FEWEST_LOOP_ROWS = 10
 
 
 def read_loop(
@@ -51,14 +49,14 @@ def read_loop(
     stated_rate = None if test.states_time or "time" in table.roles else table.sampling_rate
     test = replace(test, sampling_rate=stated_rate) if stated_rate else test
     wanted = loop_columns(table, direction, test)
-    values, notes = table.read(wanted, fewest_rows=_FEWEST_LOOP_ROWS)
+    values, notes = table.read(wanted, fewest_rows=FEWEST_LOOP_ROWS)
     table = table.needing(wanted)
     selected, degrees = rows_of_test(table, test, direction, values["force"].size)
     if selected.size < values["force"].size:
         values = {role: numbers[selected] for role, numbers in values.items()}
     displacement, force = values["displacement"], values["force"]
     for role in ("displacement", "force"):
-        if np.ptp(values[role][:_FEWEST_LOOP_ROWS]) < LEAST_VALUE and np.ptp(values[role]) < LEAST_VALUE:
+        if np.ptp(values[role][:FEWEST_LOOP_ROWS]) < LEAST_VALUE and np.ptp(values[role]) < LEAST_VALUE:
             raise table.error(f"the {role} never changes", column=wanted[role], expected="a loop")
     if displacement @ force < displacement.sum() * force.sum() / force.size:  # a negative covariance
         raise table.error(

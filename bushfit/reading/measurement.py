@@ -18,6 +18,8 @@ from bushfit.reading.preload import Preload
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Waveform = Literal["sine", "triangle"]
+#: Smallest number of rows of a loop; chosen: fewer do not show its shape.
+FEWEST_LOOP_ROWS = 10
 #: Temperatures that differ by at most this [K] count as equal; chosen: climate chambers vary by less.
 SAME_TEMPERATURE = 2.0
 #: Quantity that changes from point to point of a run of a sweep.

@@ -30,12 +30,16 @@ _UNIT_WORDS = "|".join(sorted(_UNITS, key=len, reverse=True))
 #: Quantity in a name, with its sign and the word before it: "0.5mm", "A0,5 mm", "0p5mm", "10Hz", "2deg"; but neither
 #: "20Hz" in "5-20Hz" nor "10mm_min".
 _QUANTITY = re.compile(
-    r"(?<![^\W_])(?<!\d[.,-])(?:(?P<word>[^\W\d_]+)(?P<gap>[\s_=:]*))?(?P<sign>\+/?-|±|-|\+)?\s*"
+    r"(?<![^\W_])(?<!\d[.,-])(?<!\de-)(?:(?P<word>[^\W\d_]+)(?P<gap>[\s_=:]*))?(?P<sign>\+/?-|±|-|\+)?\s*"
     r"(?P<number>\d+(?:[.,p]\d+)?)[ _-]?"
     rf"(?P<unit>{_UNIT_WORDS})(?=[^A-Za-z]|pp|pkpk|ss|spsp|$)"
     r"(?![\s/_-]*(?:(?:per|pro|p)[\s_-]*)?(?:min|s|sec)(?![A-Za-z]|-s))",
     re.IGNORECASE,
 )
+#: Underscore or missing zero instead of a decimal point: "0_1mm", "_.1mm".
+_LEADING_ZERO = re.compile(rf"(?:(?<![\d.,])0_|(?<![^\W_])\.)(?=\d+[ _-]?(?:{_UNIT_WORDS})(?![A-Za-z]))", re.IGNORECASE)
+#: Whole number before an underscore, which may be the decimal point of the next number: "1_5mm", "A_1_5 mm".
+_PERHAPS_DECIMAL = re.compile(r"(?:^|[^A-Za-z0-9]|(?<![A-Za-z])[AFTaft])\d{1,3}_$")
 #: Words that can precede a number, by the kind of quantity that they announce: amplitude, preload, size and so on.
 _WORDS = {kind: frozenset(words) for kind, words in WORDS["beside"].items()}
 #: Date: 2024-05-03, 2024_05_03, 20240503 or 03.05.2024.
@@ -169,11 +173,13 @@ def labels_in_names(*names: str) -> Labels:
 
 def _labels_in_name(name: str) -> Labels:
     """Information on a test (quantities, direction, conditions) in the name of a file, sheet or block."""
-    date, rest = _DATE.search(name), _DATE.sub(" ", name)
+    date, rest = _DATE.search(name), _LEADING_ZERO.sub("0.", _DATE.sub(" ", name))
     number = _SPECIMEN_NUMBER.search(rest)
     quantities: list[StatedQuantity] = []
     values: dict[str, Any] = {"date": date and date[0], "specimen_number": number and number[1]}
     for match in _QUANTITY.finditer(rest):
+        if match["number"].isdecimal() and _PERHAPS_DECIMAL.search(rest[: match.start("number")]):
+            continue
         word, sign = plain(match["word"] or ""), match["sign"]
         is_joined = bool(match["word"]) and not match["gap"] and not sign
         unit, digits = _UNITS[match["unit"].lower()], re.sub("[,p]", ".", match["number"].lower())
@@ -226,7 +232,7 @@ def _convention_in_line(line: Line) -> AmplitudeConvention | None:
     words = set(map(plain, _LETTERS.findall(line.text)))
     if words & _WORDS["force"] or not any(word.startswith(tuple(_WORDS["motion"])) for word in words):
         return None
-    doubled = any(word.startswith(name) for word in words for name in PEAK_TO_PEAK_NAMES if len(name) > 3)
+    doubled = any(name in plain(line.text) for name in PEAK_TO_PEAK_NAMES if len(name) > 3 or not name.isascii())
     return "peak-to-peak" if doubled else split_convention(line.text)[1]
 
 

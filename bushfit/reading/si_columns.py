@@ -53,6 +53,8 @@ def si_column(table: Table, role: str, tested: Place, hint: str | None = None) -
     """
     label, expected = role.replace("_", " "), si_unit(role, tested.motion)
     quantity, example = units.common_unit(expected)
+    if expected == "Hz" and role in table.roles and is_angular(table.roles[role].header, "1/s"):
+        quantity, example = "an angular frequency", "rad/s"
     if role not in table.roles:
         refuse_other_motion(table, role)
         ways = ", ".join(filter(None, (columns_key(table, role, expected), hint)))
@@ -80,13 +82,12 @@ def si_column(table: Table, role: str, tested: Place, hint: str | None = None) -
             hint=f'if the value 0 means 1 {example}, write units = {{ {role} = "{example}" }} in the campaign',
         )
     if column.unit is None and (expected != "1" or role in OF_MOTION):
-        angular = expected == "Hz" and is_angular(column.header, "1/s")
-        second = "rad/s" if angular else {"phase": "rad", "time": "ms"}.get(role, "")
+        second = {"phase": "rad", "time": "ms", "frequency": "Hz" if example == "rad/s" else ""}.get(role, "")
         alternative = f', or units = {{ {role} = "{second}" }}' if second else ""
         raise unclear(
             f"the {label} has no unit",
-            expected=f"{quantity}, such as {example}{', or an angular frequency, such as rad/s' * angular}",
-            hint=f'write "{column.header} [{"rad/s" if angular else example}]" in the header, '
+            expected=f"{quantity}, such as {example}",
+            hint=f'write "{column.header} [{example}]" in the header, '
             f'or units = {{ {role} = "{quantity_above(table, expected) or example}" }} in the campaign{alternative}',
         )
     unit = column.unit or "1"
@@ -103,7 +104,12 @@ def si_column(table: Table, role: str, tested: Place, hint: str | None = None) -
         )
     if role == "amplitude" and units.is_compatible(unit, "m/s^2") and expected == "m":
         return replace(column, role="acceleration", scale=units.si_factor(unit, "m/s^2"))
-    next_step = None if units.is_unit(unit) else f'state the unit: units = {{ {role} = "{example}" }} in the campaign'
+    next_step = None
+    if not units.is_unit(unit):
+        size = unit if units.is_unit(_MULTIPLE.sub("", unit).strip()) else f"... {example}"
+        next_step = f'state the unit: units = {{ {role} = "{example}" }} in the campaign'
+        if not unit.isalpha():
+            next_step = f'state the size of one "{unit}": units = {{ {role} = "{size}" }} in the campaign'
     with error_location(table.file, place, next_step):
         if expected == "Hz" and is_angular(column.header, unit):
             per_second = "rad/s" if units.is_compatible(unit, "rad/s") else "Hz"

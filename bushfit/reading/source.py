@@ -21,6 +21,8 @@ from bushfit.units import SIZES
 #: Smallest positive value and largest magnitude of a number in a table [SI unit].
 LEAST_VALUE, LARGEST_VALUE = SIZES
 _LINE_END = re.compile(rb"\r\n|\n|\r")
+#: Bytes, or rows, at the end of a file that are searched for notes; chosen: room for a paragraph.
+_TAIL_BYTES, _TAIL_ROWS = 2048, 20
 #: Rows of channels that are converted at a time; chosen: they take a few MiB.
 _CHUNK_ROWS = 1 << 14
 #: Thousands separated by a blank.
@@ -54,6 +56,11 @@ class Text:
         stream = io.BytesIO(self.data)
         stream.seek(self.offset(after))
         return _non_empty_lines(stream, max(after, self.before))
+
+    def tail(self) -> Iterator[Line]:
+        """Yield the last non-empty lines of the text, which can be notes."""
+        start = self.data.rfind(b"\n", 0, max(len(self.data) - _TAIL_BYTES, 0)) + 1
+        return _non_empty_lines(io.BytesIO(self.data[start:]), self.before + self.data.count(b"\n", 0, start))
 
     def offset(self, after: int) -> int:
         """Return the index of the first byte after the line of the file with number `after`."""
@@ -171,6 +178,12 @@ class Sheet:
     def head(self) -> list[Line]:
         """Return the lines above the table, and the first non-empty rows, which can contain the header."""
         return [*self.above, *islice(self.lines(0), MOST_HEAD_LINES)]
+
+    def tail(self) -> Iterator[Line]:
+        """Yield the last non-empty rows of the sheet, which can be notes."""
+        start = max(len(self.content) - _TAIL_ROWS, 0)
+        numbers = self.numbers or range(1, len(self.content) + 1)
+        return (Line(*row) for row in zip(numbers[start:], self.content[start:], strict=True) if any(row[1]))
 
     def lines(self, after: int) -> Iterator[Line]:
         """Yield the non-empty rows of the sheet below the row with number `after`; all rows of a rearranged table."""

@@ -252,11 +252,16 @@ class Table:
 
     @cached_property
     def lines_above(self) -> list[Line]:
-        """Non-empty lines above the table, and footnotes below it, each behind the header that refers to it."""
-        above = [line for line in self.source.head() if line.number < self.layout.header_line]
+        """Non-empty lines above the table, and notes below it; a footnote is behind the header that refers to it."""
+        lines = [line for line in self.source.head() if line.number < self.layout.header_line]
         marks = {mark: header for header in self.headers for mark in _FOOTNOTE_MARK.findall(header)}
-        below = (line for line in self.source.lines(self.layout.header_line) if line.text[:1] in marks) if marks else ()
-        return above + [Line(line.number, f"{marks[line.text[0]]}: {line.text[1:]}") for line in below]
+        for line in self.source.tail():
+            cells = list(map(str, cells_of(line, self.layout.delimiter)))
+            is_note = not (any(map(is_like_number, cells)) or is_summary_row(cells) or self.layout.is_repeated(cells))
+            if line.number > self.layout.lines_before_data and is_note:
+                mark = line.text[:1]
+                lines.append(Line(line.number, f"{marks[mark]}: {line.text[1:]}") if mark in marks else line)
+        return lines
 
     @cached_property
     def labels_above(self) -> Labels:

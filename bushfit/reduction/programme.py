@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bushfit.errors import MeasurementError
+from bushfit.errors import NoTestError
 from bushfit.reading.measurement import Floats, Loop, RecordPart
 from bushfit.reading.stated import LoopFile
 from bushfit.reduction.cycles import lone_outliers, resumes_in_phase, shifted_difference, stretches
@@ -114,7 +114,7 @@ def steady_spans(loop: Loop, time: Floats, motion: Floats) -> list[SteadySpan]:
         Parts in order; empty if there are fewer than three strokes (motions from one turning point to the next).
 
     Raises:
-        MeasurementError: there are cycles, but no two of them are alike.
+        NoTestError: there are cycles, but no two of them are alike.
     """
     turns, prominence = motion_turns(time, motion)
     if turns.size < 4:
@@ -141,7 +141,7 @@ def steady_spans(loop: Loop, time: Floats, motion: Floats) -> list[SteadySpan]:
     if not spans and inner.size >= 4 and np.ptp(np.log(inner)) > 0.3:  # no rig misses its amplitude by a third
         unit, factor = loop.direction.display.displacement
         low, high = factor * inner.min() / 2.0, factor * inner.max() / 2.0
-        raise MeasurementError(
+        raise NoTestError(
             "no part of the record is a loop",
             file=loop.source.file if loop.source else loop.name,
             found=f"{inner.size / 2.0:.2g} cycles from {low:.3g} to {high:.3g} {unit}, no two successive ones equal",

@@ -26,6 +26,7 @@ def amplitudes(said: Labels, expected: str = "m") -> list[tuple[str, str | None]
         ("Amplitude_0.2mm_bushing_18mm", "0.2 mm", None), ("CMP15961_2024-05-03_0.1mm", "0.1 mm", None),
         ("03.05.2024 radial 0.1mm", "0.1 mm", None), ("d20mm_L34mm_0.3mm", "0.3 mm", None),
         ("abc18mm_1mm", "1 mm", None), ("preload_1.5mm_0.2mm", "0.2 mm", None),
+        ("K_0_1mm", "0.1 mm", None), ("A_0_25mm", "0.25 mm", None), ("K_.1mm", "0.1 mm", None),
         ("loop 1,0 mm 10mm_min", "1 mm", None), ("5-155Hz_0.1mm", "0.1 mm", None),
     ],
 )  # fmt: skip
@@ -52,6 +53,8 @@ def test_the_amplitude_in_a_name(name, text, convention):
         ("a 21c", {}),
         ("2kN", {}),
         ("0.02rad", {}),
+        ("K_1_5mm", {}),
+        ("F1_5kN 23_5C 1e-1mm", {}),
     ],
 )
 def test_what_else_a_name_says(name, keys):
