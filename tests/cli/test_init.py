@@ -9,6 +9,7 @@ import shutil
 import tomllib
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 from hypothesis import given
@@ -242,7 +243,14 @@ def test_folders_in_folders_are_searched_and_bad_names_are_left_out(typed, root,
     (tmp_path / "lab/dangling.csv").symlink_to("nowhere.csv")
     (tmp_path / "lab/axial_\u202e.csv").write_text("x", encoding="utf-8")
     Path(os.fsdecode(os.fsencode(tmp_path / "lab") + b"/axial_\xff.csv")).write_text("x", encoding="utf-8")
-    done = typed("init", "lab", *GEOMETRY, "-o", "x.toml")
+    time = np.arange(0.0, 6.0, 0.02)
+    road = np.sin(6.0 * time) * np.exp(0.3 * time)  # no two cycles are alike
+    rows = np.column_stack([time, road, 800.0 * road])
+    np.savetxt(tmp_path / "lab/road_axial.csv", rows, "%.5f", ",", header="t [s],x [mm],F [N]", comments="")
+    assert "no part of the record is a loop" in typed("inspect", "lab/road_axial.csv", "--json", status=2).stderr
+    for arguments in (("inspect", "lab", "--no-plots"), ("init", "lab", *GEOMETRY, "-o", "x.toml")):
+        done = typed(*arguments)
+        assert "road_axial.csv: no part of the record is a loop" in done.stderr
     campaign = load_campaign(tmp_path / "x.toml")
     assert [str(test.direction) for test in campaign.sweeps] == ["axial", "radial"]
     for words in (r"axial_\u202e.csv: its name", r"axial_\udcff.csv: its name", "dangling.csv: a broken link"):
