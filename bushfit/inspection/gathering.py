@@ -30,6 +30,13 @@ from bushfit.reading.measurement import FEWEST_LOOP_ROWS, Loop, Sweep
 from bushfit.reading.names import NO_LABELS, Labels, labels_above, labels_in_names
 from bushfit.reading.parts import open_file
 from bushfit.reading.roles import CONDITIONS
+from bushfit.reading.table import Table
+
+#: Role of the column that a file lacks, by the key of a campaign that states it.
+_INSTEAD_OF_COLUMN = {
+    **{f"at_{role}": role for role in ("amplitude", "frequency")},
+    **dict.fromkeys(("sampling_rate", "rate", "frequency", "waveform"), "time"),
+}
 
 
 @dataclass(frozen=True)
@@ -214,7 +221,8 @@ def distribute_options(sources: Sequence[TestSource], test_options: Mapping[str,
     """Give each test the options that apply to it.
 
     The option for a column is dropped for tests without this column, and the option for a unit is dropped for tests
-    whose header states the unit. A temperature that selects rows is dropped for files without a temperature column.
+    whose header states the unit. A temperature that selects rows is dropped for files without a temperature column. An
+    option that stands for a column is dropped for tests with this column, if other tests lack it.
 
     Args:
         sources: the tests.
@@ -232,14 +240,19 @@ def distribute_options(sources: Sequence[TestSource], test_options: Mapping[str,
         needs = [needs_option(source.file, key, role, keys) for source, keys in zip(sources, by_source, strict=True)]
         for keys in (keys for keys, one in zip(by_source, needs, strict=True) if one is False and True in needs):
             keys[key] = {name: text for name, text in keys[key].items() if name != role}
-    if test_options.get("temperature") and len(sources) > 1:
-        counts = dict[int, int]()
-        for index, source in enumerate(sources):
-            with suppress(BushfitError):  # which the inspection of the file reports
-                counts[index] = count_temperatures(recognize_table(source.file, by_source[index])[0])
-        for index, count in counts.items():
-            if count == 0 and max(counts.values()) > 1:
-                by_source[index]["temperature"] = None
+    stated_keys = [key for key in (*_INSTEAD_OF_COLUMN, "temperature") if test_options.get(key) and len(sources) > 1]
+    recognized = dict[int, Table]()
+    for index, source in enumerate(sources) if stated_keys else ():
+        with suppress(BushfitError):  # which the inspection of the file reports
+            recognized[index] = recognize_table(source.file, by_source[index])[0]
+    for name in stated_keys:
+        column = _INSTEAD_OF_COLUMN.get(name)
+        numbers = {
+            n: int(column not in one.roles) if column else count_temperatures(one) for n, one in recognized.items()
+        }
+        for index, number in numbers.items():
+            if number == 0 and max(numbers.values()) > (0 if column else 1):
+                by_source[index][name] = None
     return [replace(source, test_options=keys) for source, keys in zip(sources, by_source, strict=True)]
 
 

@@ -127,8 +127,7 @@ def campaign_entry(
         The options that apply to the test, without those that the file itself states.
     """
     roles, schema = (SWEEP_COLUMNS, SweepFile) if is_sweep else (LOOP_COLUMNS, LoopFile)
-    needless = {"direction", "specimen", "columns", "units"} | {f"at_{role}" for role in table.roles}
-    needless |= {"sampling_rate", "rate", "frequency", "waveform"} if "time" in table.roles else set()
+    needless = {"direction", "specimen", "columns", "units"}
     needless |= {"temperature"} if test_options.get("temperature") and count_temperatures(table) == 1 else set()
     keys = {field.name for field in fields(schema)} - needless
     entry: dict[str, Any] = {"specimen": place.name} if isinstance(place, Specimen) else {}

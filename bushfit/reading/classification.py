@@ -37,8 +37,10 @@ from bushfit.reading.times import clock
 
 #: Smallest similarity, from 0 to 1, of a header that is suggested for a missing one; chosen: one word of two suffices.
 _ALIKE = 0.4
-#: Factor at the end of a name, outside of the unit: "K*/1000", "Amplitude x10".
-_FACTOR = re.compile(r"(?:/|\s[x×*])\s?(?!1$)\d+(?:[.,]\d+)?$")
+#: Factor in a name, outside of the unit: "K*/1000", "Amplitude x10", "2 K*", "1/2 K*".
+_FACTOR = re.compile(r"(?:/|\s[x×*])\s?(?!1$)\d+(?:[.,]\d+)?$|^[\d.,/]+\s?[x×*·]?\s?(?=[^\W\d_])")
+#: Smallest loss factor that shows that K1 and K2 are hardly storage and loss; chosen: above that of nearly all rubbers.
+_LARGE_LOSS = 0.5
 #: Number at the end of the name of one of several columns for a quantity: "K1", "Phase_2".
 _NUMBERED = re.compile(r"(.*?[^\d\s_])[\s_]?(\d)")
 
@@ -145,21 +147,25 @@ def _require_plain_names(table: Table, roles: Mapping[str, Column]) -> None:
             and loss.
     """
     names = {role: split_unit(column.header)[0].strip() for role, column in roles.items()}
-    for role, name in names.items():
-        if _FACTOR.search(name):
+    factors = {role: match[0] for role, name in names.items() if (match := _FACTOR.search(name))}
+    for role, factor in factors.items():
+        if not factor[0].isdigit() or len(factors) == 1:  # several leading numbers count the columns
             raise table.header_error(
                 f"the name of the {role.replace('_', ' ')} contains a factor",
                 found=f'"{roles[role].header}"',
                 expected="numbers in the stated unit",
                 hint=f'if they are, name the column: columns = {{ {role} = "{roles[role].header}" }} in the campaign; '
-                f'otherwise write the factor into the unit, such as units = {{ {role} = "10^3 {roles[role].unit}" }}',
+                f'otherwise write the factor into the unit, such as units = {{ {role} = "... {roles[role].unit}" }}',
             )
     stems = {str(number): set[str]() for number in range(10)}
     for header in table.headers:
         if match := _NUMBERED.fullmatch(split_unit(header)[0].strip()):
             stems[match[2]].add(match[1].casefold())
-    both = {"storage_stiffness", "loss_stiffness"} <= names.keys()
-    if both and len(stems["1"] & stems["2"]) > 1 and _NUMBERED.fullmatch(names["storage_stiffness"]):
+    both = [roles[role] for role in ("storage_stiffness", "loss_stiffness") if role in roles]
+    storage, loss = np.abs(first_numbers(table, both)).sum(axis=0) if len(both) > 1 else (1.0, 0.0)
+    numbered = stems["1"] & stems["2"]
+    is_doubtful = len(numbered) > 1 or (numbered and loss > _LARGE_LOSS * storage)
+    if len(both) > 1 and is_doubtful and _NUMBERED.fullmatch(names["storage_stiffness"]):
         header = roles["storage_stiffness"].header
         raise table.header_error(
             "numbered columns may be repeats, parts, or storage and loss",

@@ -123,7 +123,8 @@ def tdms(data: bytes, _: Path) -> Iterator[Group]:
                 bases = {"Hz": "frequency", "s": "time"}
                 name = next((name for si, name in bases.items() if units.is_compatible(unit, si)), "x")
                 over = Channel(name, properties.get("wf_start_offset", 0.0) + step * np.arange(len(values)), unit)
-            channels.append(Channel(channel.name, values, properties.get("unit_string", ""), over))
+            unit = properties.get("unit_string") or properties.get("NI_UnitDescription", "")
+            channels.append(Channel(channel.name, values, unit, over))
         yield group.name, channels, [*file.properties.items(), *group.properties.items()]
 
 

@@ -80,6 +80,8 @@ def read_loop(
     else:
         time = test.rebuild_time(displacement)
         notes += (table.note_sampling,) if stated_rate else ()
+        if "time" in table.roles:
+            notes += (f'"{table.roles["time"].header}" is not used, because the campaign states the time',)
     unknown = note_not_understood(table, table.row_labels, selected)
     temperature = mean_temperature(degrees) if test.temperature is None else test.temperature
     return Loop(
@@ -124,7 +126,7 @@ def loop_columns(table: Table, direction: Place, test: LoopFile) -> dict[str, Co
         )
     wanted = {role: si_column(table, role, direction) for role in ("displacement", "force")}
     wanted["force"] = replace(wanted["force"], scale=test.force_sign * wanted["force"].scale)
-    if "time" in table.roles:
+    if "time" in table.roles and not test.states_time:
         wanted["time"] = time_column(table, direction)
     elif not test.states_time:
         rate = quantity_above(table, "m/s") or "10 mm/min"
@@ -188,7 +190,10 @@ def increasing_time(table: Table, column: Column, time: Floats) -> tuple[Floats,
     if stuck.any() and (even := spread(time)) is not None:
         rate = (time.size - 1) / (even[-1] - even[0])
         return even, (f'"{column.header}" is rounded and repeats: its rows are spread evenly, at {rate:.6g} Hz',)
-    hint = "if a column numbers the runs, bushfit init makes one loop of each run"
+    steps = np.diff(time)[~stuck]
+    rate = f"{1.0 / np.median(steps):.6g} Hz" if steps.size else "... Hz"
+    hint = f'if the rows are evenly spaced, sampling_rate = "{rate}" in the campaign replaces this column; '
+    hint += "if a column numbers the runs, bushfit init makes one loop of each run"
     if "block" in table.headers:
         hint = 'this file has several blocks: rows = { block = "1" } in the campaign selects the first; '
         hint += "bushfit init uses all"
