@@ -254,9 +254,9 @@ class BatchResult:
         labels = dict[str, str]()
         if any(row.settings.diagnoses for row in self.plan.rows):
             labels["verdict"] = record.verdict or ""
-            labels["named effects"] = ", ".join(record.effects)
-            labels["cannot be told from"] = ", ".join(record.alternatives)
-        labels["on a bound"] = ", ".join(f"{name} ({end})" for name, end in record.at_bound.items())
+            labels["probable effects"] = ", ".join(record.effects)
+            labels["alternatives"] = ", ".join(record.alternatives)
+        labels["at bound"] = ", ".join(f"{name} ({end})" for name, end in record.at_bound.items())
         labels |= {"campaign name": record.campaign_name, "subgroup": row.subgroup or ""}
         values = [self.estimates[name][0, index] * column.factor for name, column in columns.items()]
         curve = [float(column[index]) for column in self.curves.values()]
@@ -333,21 +333,21 @@ class BatchResult:
         }
         if self.plan.limits:
             columns["limits"] = [part.result or "" for part in parts]
-            columns["out of limits"] = ["; ".join(part.misses.values()) for part in parts]
-            columns["on the edge"] = ["; ".join(part.doubtful.values()) for part in parts]
+            columns["missed limits"] = ["; ".join(part.misses.values()) for part in parts]
+            columns["undecided limits"] = ["; ".join(part.doubtful.values()) for part in parts]
         labels = {name: [part.labels[name] for part in parts] for name in parts[0].labels}
-        bounds, *last = (labels.pop(name) for name in ("on a bound", "campaign name", "subgroup"))
+        bounds, *last = (labels.pop(name) for name in ("at bound", "campaign name", "subgroup"))
         columns |= labels
         for name, quantity in self.quantities.items():
             endings = _PARAMETER_COLUMNS if is_parameter(name) else {"": 0} if name in FIT_NAMES else _POINT_COLUMNS
             for ending, line in endings.items():
                 figures = self.estimates.get(name, unknown)[line]
                 columns[quantity.tabled.header + ending] = figures * quantity.tabled.factor
-        columns["on a bound"] = bounds
+        columns["at bound"] = bounds
         columns["warnings"] = [" | ".join(record.warnings) for record in records]
         columns["campaign name"], columns["subgroup"] = last
         columns["differs in"] = [part.differs for part in parts]
         columns["poor fit"] = [part.poor_fit for part in parts]
         columns |= {f"robust z of {name} [-]": z for name, z in self.outliers[0].items()}
-        columns |= {"measured stiffness off the median [%]": 100.0 * self.curve_deviation} if self.curves else {}
+        columns |= {"measured stiffness above the median [%]": 100.0 * self.curve_deviation} if self.curves else {}
         return pd.DataFrame(columns | self.curves)

@@ -165,7 +165,7 @@ class ExportRequest:
                 ]
                 temperatures = [kelvin - CELSIUS for kelvin in measured.temperature or ()]
                 parts.append(format_range("degC", *temperatures) if temperatures else "temperature not stated")
-                parts.append("fitted there" if fitted else "not fitted there")
+                parts.append("fitted" if fitted else "not fitted")
                 yield "valid", ", ".join(parts)
         yield from (("limit", omission) for omission in omissions)
         warnings = warnings_of(self.result, [prediction.warnings for prediction in self.predictions])

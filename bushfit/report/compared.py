@@ -30,7 +30,7 @@ _LEAST_PROBABILITY = 1e-3
 #: Column header of the loss factor.
 LOSS = "loss factor [-]"
 #: Column headers of the held-out gain of a family with its 95 % interval in families.csv.
-_GAIN_HEADERS = [f"fall of the mean square{end}" for end in ("", ", low", ", high")]
+_GAIN_HEADERS = [f"decrease of the mean square{end}" for end in ("", ", low", ", high")]
 #: Column headers of the rows of `family_cells`.
 FAMILY_HEADS = ("family", "parameters", "NRMSE", "χ²", "probability", "held out", "first, held out", "parts")
 
@@ -45,7 +45,7 @@ def contrast_table(comparison: Comparison, contrast: Contrast) -> pd.DataFrame:
 
     Returns:
         A row per operating point: frequency, amplitude, then values and differences with the ends of their 95 % bands
-        ("..., low" and "..., high"), and "yes" or "no" for a significant difference ("..., sure").
+        ("..., low" and "..., high"), and "yes" or "no" for a significant difference ("..., significant").
     """
     (_, length), _, (_, factor) = contrast.place.display
     columns: list[Any] = [contrast.reference.frequency, contrast.reference.amplitude * length]
@@ -63,7 +63,7 @@ def contrast_headers(amplitude: str, stiffness: str) -> list[str]:
     sides = [f"{side} {name}" for side in ("reference", "other") for name in (stiffness, LOSS)]
     differences = (f"relative difference of {split_header(stiffness)[0]} [-]", f"difference of {LOSS}")
     headers = ["frequency [Hz]", amplitude, *(f"{name}{end}" for name in sides for end in ends)]
-    return [*headers, *(f"{name}{end}" for name in differences for end in (*ends, ", sure"))]
+    return [*headers, *(f"{name}{end}" for name in differences for end in (*ends, ", significant"))]
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,8 +114,8 @@ class PlaceDifferences:
                 place=f"pairs, {label}, places, {place}",
                 expected="the columns that bushfit compare writes, equally long",
             )
-        types = {header: float for header in columns if not header.endswith(", sure")}
-        table = pd.DataFrame({"other": label, "place": place, **columns}).astype(types)
+        types = {header: float for header in columns if not header.endswith(", significant")}
+        table = pd.DataFrame({"other": label, "direction": place, **columns}).astype(types)
         return cls(label, place, table, amplitude, stiffness)
 
     def band(self, header: str) -> Array:
@@ -181,10 +181,10 @@ def parameter_differences_table(comparison: ComparisonFile) -> pd.DataFrame:
             "difference": row.difference,
             "difference, low": row.interval and row.interval[0],
             "difference, high": row.interval and row.interval[1],
-            "difference is": "relative" if row.relative else "absolute",
+            "difference type": "relative" if row.relative else "absolute",
             "p": row.p,
-            "p by Holm": row.holm,
-            "not tested": row.note,
+            "p (Holm)": row.holm,
+            "note": row.note,
         }
         for pair in comparison.pairs
         for row in pair.parameters
@@ -210,14 +210,14 @@ def families_table(families: Sequence[FamilyEntry]) -> pd.DataFrame:
             "family": family.name,
             "parameters": family.parameters,
             "reduced chi-square": family.reduced_chi_square,
-            "BIC less the first's": family.bic - families[0].bic,
+            "BIC minus that of the first": family.bic - families[0].bic,
             "held out [noise]": family.heldout,
-            "the first there [noise]": family.first_there,
-            "parts held out": len(family.parts),
+            "held out, first family [noise]": family.first_there,
+            "held-out parts": len(family.parts),
             **dict(zip(_GAIN_HEADERS, family.gain or (None, None, None), strict=True)),
-            "p by Holm": family.p,
+            "p (Holm)": family.p,
             "probability": family.probability,
-            "words": family.words,
+            "held-out result": family.words,
         }
         for family in families
     ]

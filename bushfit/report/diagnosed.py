@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 
 from bushfit.diagnosis.record import Diagnosis, level_of
+from bushfit.effects import get_parameter
 from bushfit.fitting.preparation import MeasuredSweep
 from bushfit.report.tables import condition_columns, loops_table, sweeps_table
 
@@ -65,10 +66,13 @@ def candidates_table(diagnosis: Diagnosis) -> pd.DataFrame:
         {
             "effect": judged.name,
             "level": level_of(judged.name),
-            "score": judged.score,
+            "expected chi-square gain": judged.score,
             "chi-square gain": judged.gain,
             "probability": round(judged.probability, 9),
-            "parameters": "; ".join(f"{name} = {value:.6g}" for name, value in judged.parameters.items()),
+            "parameters": "; ".join(
+                f"{name} = {value:.6g} {get_parameter(name).unit}".removesuffix(" 1")
+                for name, value in judged.parameters.items()
+            ),
             "why": judged.why,
         }
         for judged in diagnosis.candidates

@@ -27,7 +27,7 @@ from bushfit.units import CELSIUS
 #: Display unit of amplitudes and its factor from SI, by SI unit: mm for m, % for strain.
 DISPLAYS = {motion.displacement_unit: motion.display.displacement for motion in (TRANSLATION, ROTATION, STRAINING)}
 #: Suffix of headers and labels of predictions that assume an unresolved effect to belong to the test rig.
-IF_RIGS = "if it is the rig's"
+IF_RIGS = "if caused by the rig"
 
 
 def quantity_words(place: Place) -> tuple[str, str, str]:
@@ -209,7 +209,7 @@ def arms_table(model: Model, arms: Sequence[Arms], places: Sequence[Place]) -> p
     """
     names, moduli, times = zip(*arm_rows(model, arms), strict=True)
     modulus = np.array(moduli)
-    columns = {"in place of": names, "relaxation time [s]": times, "shear modulus [MPa]": 1e-6 * modulus}
+    columns = {"branch": names, "relaxation time [s]": times, "shear modulus [MPa]": 1e-6 * modulus}
     for place in places:
         *_, (unit, factor) = place.display
         columns[f"{place} {quantity_words(place)[2]} [{unit}]"] = factor * model.stiffness_per_modulus(place) * modulus
@@ -352,7 +352,7 @@ def shift_factors_table(shifted_sweeps: Sequence[ShiftedSweep]) -> pd.DataFrame:
         "direction": [str(shifted.sweep.direction) for shifted in shifted_sweeps],
         "temperature [degC]": [shifted.temperature - CELSIUS for shifted in shifted_sweeps],
     }
-    for name, key in (("log10 a_T [-]", "shift"), ("own log10 a_T [-]", "best_shift")):
+    for name, key in (("log10 a_T [-]", "shift"), ("log10 a_T of the sweep alone [-]", "best_shift")):
         value, error = np.array([getattr(shifted, key) for shifted in shifted_sweeps]).T / np.log(10.0)
         columns |= {name: value, f"{name}, low": value - Z95 * error, f"{name}, high": value + Z95 * error}
     return pd.DataFrame(columns)

@@ -49,7 +49,7 @@ def test_the_table_is_in_order_with_units_and_the_numbers_of_the_models(typed, s
     mu, friction = ([model["parameters"][name] for model in models] for name in ("mu", "sigma_fmax"))
     known = np.array([parameter.get("stderr") is not None for parameter in mu])
     assert known.sum() >= 3
-    assert all("mu" in text for text in table["on a bound"][~known])
+    assert all("mu" in text for text in table["at bound"][~known])
     for header, values in {
         "mu [MPa]": [1e-6 * parameter["value"] for parameter in mu],
         "mu [MPa], std error": [1e-6 * (parameter.get("stderr") or math.nan) for parameter in mu],
@@ -111,7 +111,7 @@ def test_limits_decide_the_exit_status_and_are_named(typed, shop):
     over = [float(row["mu [MPa]"]) > 1.1 * middle for row in table]
     assert 0 < sum(over) < 5
     assert ["fail" in row["limits"] for row in table] == over
-    assert all(row["out of limits"].startswith("mu ") == bad for row, bad in zip(table, over, strict=True))
+    assert all(row["missed limits"].startswith("mu ") == bad for row, bad in zip(table, over, strict=True))
     (suite,) = JUnitXml.fromfile(str(shop / "r.xml"))
     assert [bool(case.result) for case in suite] == over
 
@@ -127,15 +127,15 @@ def test_a_parameter_on_a_bound_of_its_fit_passes_on_condition_and_is_named(type
     assert json.loads((shop / "all/bushings/b1/model.json").read_text())["parameters"]["mu"]["at_bound"] == "max"
     good, held, other = rows(shop / "all")
     assert (good["limits"], held["limits"], other["limits"]) == ("pass", "conditional pass", "pass")
-    assert good["on a bound"] == ""
-    assert "mu (max)" in held["on a bound"]
-    assert "at the max bound of the fit" in held["on the edge"]
+    assert good["at bound"] == ""
+    assert "mu (max)" in held["at bound"]
+    assert "at the max bound of the fit" in held["undecided limits"]
     assert "warning: at a bound of the fit, because the tests do not determine them: " in done.stderr
     assert "mu of b1" in done.stderr
     assert "b1 passes conditionally: mu 0.2 MPa" in done.stderr
     typed("batch", "bushings/b[013]/bushing.toml", "-o", "none", "--no-plots", "--effect", "inertia", "--json")
     assert json.loads((shop / "none/bushings/b1/model.json").read_text())["parameters"]["mu"]["at_bound"] == "max"
-    assert not any("inertia" in row["on a bound"] for row in rows(shop / "none")), "no mass is an answer"
+    assert not any("inertia" in row["at bound"] for row in rows(shop / "none")), "no mass is an answer"
 
 
 def deadly(task: RowTask, part: Row) -> tuple[RowFile, bool]:

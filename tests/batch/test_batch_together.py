@@ -59,7 +59,7 @@ def test_the_measured_curve_ends_the_table(made, table):
     measured = table["measured stiffness axial 25 Hz 0.2 mm [N/mm]"]
     assert measured[3] == pytest.approx(at_point["stiffness [N/mm]"].mean(), rel=1e-6)
     deviation = np.exp(np.log(table[curve] / table[curve].median()).mean(axis=1)) - 1.0
-    assert np.allclose(table["measured stiffness off the median [%]"], 100.0 * deviation, atol=1e-3)
+    assert np.allclose(table["measured stiffness above the median [%]"], 100.0 * deviation, atol=1e-3)
 
 
 def test_the_page_lists_a_warning_once_with_the_number_of_its_parts(made, document):

@@ -258,8 +258,8 @@ def test_without_a_grid_it_is_the_measured_one_and_files_say_where_they_hold(roo
         assert table["frequency [Hz]"].unique() == pytest.approx(measured.iloc[:, 0].unique())
     said = (
         *("campaign: case 000, bushing.toml", "tests: 4, no date stated"),
-        "valid: axial, 0.1 to 155 Hz, 0.2 to 2 mm, temperature not stated, fitted there",
-        "valid: radial, 0.1 to 155 Hz, 0.0483 to 0.483 mm, temperature not stated, not fitted there",
+        "valid: axial, 0.1 to 155 Hz, 0.2 to 2 mm, temperature not stated, fitted",
+        "valid: radial, 0.1 to 155 Hz, 0.0483 to 0.483 mm, temperature not stated, not fitted",
     )
     today = f" on {datetime.now(UTC).date().isoformat()}"
     for deck in ("bushing.bdf", "bushing.inp", "bushing_car.bus"):

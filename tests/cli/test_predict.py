@@ -28,7 +28,7 @@ def test_a_folder_a_model_and_a_campaign_of_the_same_tests_differ_in_nothing(bus
     assert all(row["holm"] == 1.0 for pair in found["pairs"] for row in pair["parameters"] if row["p"] is not None)
     parameters, differences = (pd.read_csv(folder / f"{name}.csv") for name in ("parameters", "differences"))
     assert set(parameters["other"]) == set(differences["other"]) == {"B", "C"}
-    assert (differences["relative difference of stiffness [-], sure"] == "no").all()
+    assert (differences["relative difference of stiffness [-], significant"] == "no").all()
     assert differences["frequency [Hz]"].min() == 5.0, "the lowest that was measured"
     for line in found["words"]:
         assert line in done.stderr
@@ -39,11 +39,11 @@ def test_another_bushing_differs_and_the_places_and_grid_are_those_asked_for(bus
     grid = ("--frequencies", "10, 20 Hz", "--amplitudes", "0.1 mm", "--direction", "radial", "--direction", "axial")
     done = bushfit("compare", "model/model.json", truth, *grid, "-o", tmp_path / "x", "--no-plots")
     table = pd.read_csv(tmp_path / "x/differences.csv")
-    assert table["place"].tolist() == ["radial"] * 2 + ["axial"] * 2
+    assert table["direction"].tolist() == ["radial"] * 2 + ["axial"] * 2
     assert table["frequency [Hz]"].tolist() == [10.0, 20.0] * 2
     ratio = table["other stiffness [N/mm]"] / table["reference stiffness [N/mm]"] - 1.0
     assert abs(ratio - table["relative difference of stiffness [-]"]).max() < 1e-4
-    assert (table["relative difference of stiffness [-], sure"] == "yes").all()
+    assert (table["relative difference of stiffness [-], significant"] == "yes").all()
     assert "comparable only at equal alpha" in done.stderr
     assert "B against A, axial: stiffness 2" in done.stderr
 
@@ -59,7 +59,7 @@ def test_families_of_one_campaign_are_fitted_and_held_out(bushfit, tmp_path):
     assert table["label"].tolist() == ["A", "B", "C"]
     assert table["held out [noise]"].notna().all()
     assert "\nthe first family meets these tests within their noise" in done.stderr
-    assert table["words"][2].endswith("equal within 1 %")
+    assert table["held-out result"][2].endswith("equal within 1 %")
 
 
 def test_predict_lays_measurements_over_takes_grids_and_shows_at_most_eight_amplitudes(bushfit, tmp_path):
@@ -115,7 +115,7 @@ def test_predict_writes_maxwell_arms_where_asked(bushfit, root, tmp_path):
     assert part["largest_relative_error"] <= 0.005
     assert f"{len(part['relaxation_time_s'])} Maxwell arms represent the springpot: error at most" in done.stderr
     table = pd.read_csv(folder / "arms.csv")
-    assert table["in place of"].tolist() == ["elastic"] + ["springpot"] * len(part["relaxation_time_s"])
+    assert table["branch"].tolist() == ["elastic"] + ["springpot"] * len(part["relaxation_time_s"])
     assert table["relaxation time [s]"].tolist()[1:] == pytest.approx(part["relaxation_time_s"], rel=1e-6)
     ratio = table["radial stiffness [N/mm]"] / table["shear modulus [MPa]"]
     assert ratio.max() / ratio.min() - 1.0 < 1e-5
@@ -261,6 +261,6 @@ def test_where_nothing_was_tested_alike_the_compound_is_compared(bushfit, root, 
     bushfit("fit", root / "configs/epdm_70.toml", "--direction", "DMA", "--no-plots", "-o", tmp_path / "dma")
     done = bushfit("compare", "model", tmp_path / "dma", "-o", tmp_path / "x", "--no-plots")
     table = pd.read_csv(tmp_path / "x/differences.csv")
-    assert set(table["place"]) == {"compound"}
+    assert set(table["direction"]) == {"compound"}
     assert {"strain amplitude [%]", "other modulus [MPa]"} <= set(table)
     assert "compound: modulus " in done.stderr

@@ -87,7 +87,7 @@ def test_a_bushing_or_direction_that_is_not_there_is_one_error(shapes, tmp_path,
 )
 def test_results_are_compared_for_the_bushings_asked_for(shapes, tmp_path, options, places):
     typing(shapes)("compare", "model", "model", *options, "-o", tmp_path / "x", "--no-plots")
-    assert set(pd.read_csv(tmp_path / "x/differences.csv")["place"]) == places
+    assert set(pd.read_csv(tmp_path / "x/differences.csv")["direction"]) == places
 
 
 @pytest.mark.parametrize(

@@ -143,7 +143,17 @@ def test_shift_factors_are_those_of_the_law_where_it_holds(clean):
     assert len(factors) == len(DEGREES)
     assert len(curve) == sum(each.sweep.frequency.size for each in found)
     assert factors["log10 a_T [-]"].to_numpy() == pytest.approx([each.shift[0] / np.log(10.0) for each in found])
-    own = factors[["own log10 a_T [-]", "own log10 a_T [-], low", "own log10 a_T [-], high"]].to_numpy().T
+    own = (
+        factors[
+            [
+                "log10 a_T of the sweep alone [-]",
+                "log10 a_T of the sweep alone [-], low",
+                "log10 a_T of the sweep alone [-], high",
+            ]
+        ]
+        .to_numpy()
+        .T
+    )
     half = [1.96 * each.best_shift[1] / np.log(10.0) for each in found]
     assert own[0] - own[1] == pytest.approx(half, rel=1e-3)
     assert own[2] - own[0] == pytest.approx(half, rel=1e-3)

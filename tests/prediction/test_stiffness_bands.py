@@ -71,7 +71,7 @@ def test_what_may_be_the_rigs_is_predicted_both_ways_and_the_bands_span_both(eit
     np.testing.assert_allclose(found.stiffness.high, other.stiffness.high)
     assert told.if_in_rig is None
     table = prediction_table(found)
-    rigs = [f"{name}, if it is the rig's" for name in FOUR]
+    rigs = [f"{name}, if caused by the rig" for name in FOUR]
     assert list(table.columns[14:]) == rigs
     np.testing.assert_allclose(table[rigs[1]], found.if_in_rig.loss_factor.value)
     said = "\n".join((*found.warnings, *caveats(either)))
@@ -81,7 +81,7 @@ def test_what_may_be_the_rigs_is_predicted_both_ways_and_the_bands_span_both(eit
     shaken = predict_resonance(either, Direction.RADIAL, 1.0, 1.0, None)
     assert shaken.if_in_rig.peak[0] > 1.02 * shaken.peak[0]
     assert f"at {shaken.if_in_rig.peak[0]:.4g} Hz" in shaken.warnings[-1]
-    rigs_too = predicted_resonance_table(shaken)["transmissibility [-], if it is the rig's"]
+    rigs_too = predicted_resonance_table(shaken)["transmissibility [-], if caused by the rig"]
     np.testing.assert_allclose(rigs_too, np.abs(shaken.if_in_rig.transmissibility))
 
 

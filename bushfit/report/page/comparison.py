@@ -90,7 +90,7 @@ def difference_sizes(one: PlaceDifferences) -> dict[str, str]:
         finite_ends = np.sort(values[np.isfinite(values)])[[0, -1]].tolist() if np.isfinite(values).any() else []
         ends = dict.fromkeys(format_difference(end, 0.1 * max(map(abs, finite_ends))) for end in finite_ends)
         row[key] = " to ".join(ends) + unit
-        significant = int((table[f"{header}, sure"] == "yes").sum())
+        significant = int((table[f"{header}, significant"] == "yes").sum())
         count = "all" if significant == len(table) else f"{significant} of"
         sentence = f"significant at {count} {len(table)} points" if significant else "not significant"
         row[f"{key}_sure"] = sentence if (high - low).any() else "error not known"
@@ -121,7 +121,7 @@ def value_rows(differences: Mapping[str, Sequence[PlaceDifferences]]) -> Iterato
                 value, low, high = (scale * row[f"{difference}{end}"] for end in ("", ", low", ", high"))
                 size, *ends = (format_difference(end, high - low) for end in (value, low, high))
                 sides = format_aligned([row[f"{who} {quantity}"] for who in ("reference", "other")], 4)
-                significant = row[f"{difference}, sure"] == "yes"
+                significant = row[f"{difference}, significant"] == "yes"
                 cells.append((*(side + suffix for side in sides), size + percent, " to ".join(ends), significant))
             point = f"{number(frequency[index], 4)} Hz", format_range(length or "", amplitude[index])
             yield one.place, one.label, *point, *cells

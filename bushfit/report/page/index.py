@@ -24,7 +24,7 @@ _LEAST_SCALE = 0.005
 #: Order of the rows: parts that need attention first.
 _ORDER = ("error", "fail", "conditional fail", "not judged", "differs", "conditional pass", "")
 #: Text columns that the table of parts contains if they differ between parts (the first: also from the part's name).
-_LABELS = ("campaign name", "subgroup", "verdict", "named effects", "on a bound")
+_LABELS = ("campaign name", "subgroup", "verdict", "probable effects", "at bound")
 
 
 def index_page(batch: BatchFile, folder: Path, base: str = "") -> str:
