@@ -198,7 +198,7 @@ def _print_effects(output: Output, document: PlanFile) -> None:
     ranked = sorted(amounts_of.items(), key=lambda item: ratios[item[0]])
     printed = ranked if output.verbose else ranked[:_MOST_EFFECTS]
     title = (
-        "smallest amount that is detected in nine of ten cases and exceeds the accuracy class of the rig, for "
+        "smallest amount of an effect that the tests detect (probability 90 %, and above the errors of the rig): "
         f"{len(printed)} of {len(ranked)} effects"
     )
     rows = []

@@ -73,9 +73,9 @@ _LAWS: tuple[tuple[float, float, float, tuple[Measure, ...], str], ...] = (
     (-90, 1, 0, ("gain",), "a delay of the force"),
 )
 _MEASURES: dict[Measure, str] = {
-    "stiffness": "the same stiffness in every direction",
-    "modulus": "the same modulus over strain",
-    "gain": "the same share of the stiffness in every direction",
+    "stiffness": "equal in N/mm in every direction",
+    "modulus": "equal as a modulus over strain",
+    "gain": "equal in % of |K| in every direction",
 }
 _QUARTERS = {0: "more stiffness", 90: "more loss", 180: "less stiffness", -180: "less stiffness", -90: "less loss"}
 

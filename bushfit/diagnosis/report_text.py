@@ -252,7 +252,7 @@ class DiagnosisWriter:
         gap, candidates = closing.gap, self._candidates
         advice = self._deciding_advice(candidates[0] if candidates else first)
         if leads := [f"--adopt {name}" for name in self.finding.leads if get_mistake(name) is None]:
-            advice = "; ".join(filter(None, (advice, f"bushfit diagnose CAMPAIGN {' '.join(leads)} fits the leads")))
+            advice = "; ".join(filter(None, (advice, f"to try the leads: bushfit diagnose CAMPAIGN {' '.join(leads)}")))
         at_fault = " and ".join(part.name for part in first.best.faulty_parts)
         if gap:
             before, after = (fit.mean_square**0.5 for fit in (self.search.base, gap.after))

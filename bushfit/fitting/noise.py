@@ -44,7 +44,7 @@ LineKey = tuple[str, float]
 _ORIGINS = {
     "repeats": "from repeats",
     "stated": "stated in the campaign",
-    "assumed": "without repeats: scatter about a smooth curve; shared errors assumed for the class of [rig]",
+    "assumed": "without repeats: scatter about a smooth curve; gain and phase assumed for a usual rig",
 }
 
 

@@ -122,11 +122,13 @@ class Inspection:
 
     @property
     def label(self) -> str:
-        """Name of the file, followed by sheet, direction and part if the file contains several."""
+        """Name of the file, and its sheet, direction, part, temperature and preload if the file contains several."""
         in_columns = {column.role for column in self.columns}
         direction = self.direction if "direction" in in_columns else None
         part = self.part if "specimen number" in in_columns else None
         added = {word_for_part(self.file): self.entry.get("sheet"), "direction": direction, "part": part}
+        several = {column.role for column in self.columns if column.low != column.high}
+        added |= {key: self.entry.get(key) for key in ("temperature", "preload") if key in several}
         added |= self.entry.get("rows", {})
         return ", ".join([self.file.name, *(f"{key} {value}" for key, value in added.items() if value)])
 

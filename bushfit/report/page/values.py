@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from bushfit.effects.contract import Array
+from bushfit.effects.temperature import REFERENCE
 from bushfit.model.covariance import Z95
 from bushfit.model.result import Result
 from bushfit.prediction.bands import Band
@@ -13,7 +14,7 @@ from bushfit.prediction.static_curve import static_curve, static_rate
 from bushfit.prediction.stiffness import Prediction, predict
 from bushfit.prediction.superposed import untimed_effects
 from bushfit.report.tables import spread_indices
-from bushfit.units import display_unit, format_aligned, format_range, number
+from bushfit.units import CELSIUS, display_unit, format_aligned, format_range, number
 
 #: Highest frequency at which a stiffness is reported as static [Hz].
 _STATIC = 1.0
@@ -47,11 +48,13 @@ def headline_texts(result: Result, prediction: Prediction) -> dict[str, str]:
     point = predict(result, place, [frequency], [amplitude])
     unit, to_unit = display_unit(name, factor, float(point.stiffness.value[0]))
     dynamic, loss = band_at(point.stiffness, 0, to_unit), band_at(point.loss_factor, 0)
+    preload = f"preload {prediction.preload.text(place)}" if prediction.preload else ""
+    temperature = f"{number(REFERENCE - CELSIUS, 3)} °C" if "temperature" in result.model.depends_on else ""
     row = {
         "place": str(place),
         "frequency": f"{number(frequency, 3)} Hz",
         "amplitude": format_range(length, to_length * amplitude),
-        "preload": f"preload {prediction.preload.text(place)}" if prediction.preload else "",
+        "conditions": ", ".join(filter(None, (preload, temperature))),
         "stiffness": f"{format_aligned(dynamic[:1], 4)[0]} {unit}",
         "stiffness_band": format_interval(dynamic),
         "loss_factor": format_aligned(loss[:1], 3)[0],

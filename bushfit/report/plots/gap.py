@@ -235,7 +235,7 @@ def _draw_scale(axes: Axes, edges: Array, colors: ScalarMappable) -> None:
     """Draw the colour bar that all maps share in its own panel."""
     axes.set_axis_off()
     bar = axes.figure.colorbar(colors, cax=axes.inset_axes((0.12, 0.0, 0.76, 0.7)), orientation="horizontal")
-    bar.ax.set_xticks(edges, [f"{edge:g}" for edge in edges], **style.WORDS)
+    bar.ax.set_xticks(edges, ["" if edge == -_EDGES[0] else f"{edge:g}" for edge in edges], **style.WORDS)  # room
     bar.ax.tick_params(length=2)
     bar.outline.set(edgecolor=style.GREY, linewidth=0.6)
     bar.set_label("measured minus model [% of |K|]")
@@ -257,7 +257,7 @@ def _draw_loops(panels: Sequence[Axes], place: Place, loops: dict[str, pd.DataFr
     """
     looks = style.styles(len(loops), "loop")
     for axes, side in zip(panels, sides, strict=True):
-        style.label_axes(axes, "phase after upper turn [deg]", "")
+        style.label_axes(axes, "phase after turn [deg]", "")
         for loop, look in zip(loops.values(), looks, strict=True):
             draw_sector_means(axes, loop, place, f"force {side} [%]", look)
         axes.axhline(0.0, color=style.GREY, lw=0.6, zorder=1)

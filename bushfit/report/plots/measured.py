@@ -181,7 +181,7 @@ def draw_sector_means(axes: Axes, loop: pd.DataFrame, place: Place, header: str,
     sectors = np.floor(phase_after_turn(loop, place) / SECTOR) % round(360.0 / SECTOR)
     means = loop[header].groupby(sectors).mean()
     axes.plot((means.index + 0.5) * SECTOR, means, color=look.color, ls=look.dashes, lw=1.4)
-    axes.set(xlim=(0.0, 360.0), xticks=range(0, 361, 90))
+    axes.set(xlim=(0.0, 360.0), xticks=range(0, 360, 90))
 
 
 def phase_after_turn(loop: pd.DataFrame, place: Place) -> Array:

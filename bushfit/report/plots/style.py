@@ -211,7 +211,7 @@ def label_left(axes: Axes, label: str, **options: Any) -> None:
 
 
 def logarithmic(axes: Axes, values: Array, axis_name: Literal["x", "y"] = "x") -> None:
-    """Make an axis logarithmic, with ticks as plain numbers such as 0.1, 1 and 10.
+    """Make an axis logarithmic, with ticks as plain numbers such as 0.1, 1 and 10, and as powers from 10,000.
 
     Args:
         axes: panel.
@@ -222,8 +222,15 @@ def logarithmic(axes: Axes, values: Array, axis_name: Literal["x", "y"] = "x") -
     axes.set(**{f"{axis_name}scale": "log"})
     subs = (1, 3) if values.max() < 10.0 * _LOG_RATIO * values.min() else (1,)
     axis.set_major_locator(LogLocator(subs=subs, numticks=_MOST_TICKS - 1))
-    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_major_formatter(FuncFormatter(_tick_label))
     axis.set_minor_formatter(NullFormatter())
+
+
+def _tick_label(value: float, _: int) -> str:
+    """Label of a tick: "0.1", "300", and "10⁴" or "3·10⁴" from 10,000."""
+    mantissa, power = f"{value:.0e}".split("e")
+    short = f"{mantissa}·10{'⁰¹²³⁴⁵⁶⁷⁸⁹'[int(power) % 10]}".removeprefix("1·")
+    return short if value >= 1e4 else f"{value:g}"
 
 
 def widen_span(axes: Axes, minimum: float) -> None:

@@ -66,7 +66,7 @@ def test_it_says_what_the_document_says(documents, compared, name):
         half_digit = 0.5001 * 10.0 ** -len(number.partition(".")[2])
         assert abs(float(number) - value) <= half_digit
     assert 10.0 ** -len(shown[5].partition(".")[2]) < 0.1 * width, "the interval keeps two digits of its width"
-    axial = pd.read_csv(compared / name / "differences.csv").query("place == 'axial' and other == 'B'")
+    axial = pd.read_csv(compared / name / "differences.csv").query("direction == 'axial' and other == 'B'")
     change = 100.0 * axial["relative difference of stiffness [-]"]
     ends = re.search(r"B, axial ([-+][\d.]+) to ([-+][\d.]+) % (?:significant at (\d+) of|not significant)", text)
     assert [float(ends[1]), float(ends[2])] == pytest.approx([change.min(), change.max()], abs=0.006)
