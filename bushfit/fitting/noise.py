@@ -44,7 +44,7 @@ LineKey = tuple[str, float]
 _ORIGINS = {
     "repeats": "from repeats",
     "stated": "stated in the campaign",
-    "assumed": "without repeats: scatter about a smooth curve; gain and phase assumed, unless [rig] of the campaign states them",
+    "assumed": "without repeats: scatter about a smooth curve; gain and phase assumed, see [rig] in a campaign",
 }
 
 
