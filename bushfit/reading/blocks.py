@@ -5,24 +5,20 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from dataclasses import replace
-from itertools import accumulate, groupby, islice, pairwise, zip_longest
+from itertools import groupby, islice, pairwise, zip_longest
 from typing import NamedTuple
 
 from bushfit import units
 from bushfit.geometry import Direction
-from bushfit.reading.headers import COUNTED, SWEEP_COLUMNS, Vocabulary, split_unit
+from bushfit.reading.block_labels import is_of_block, label_columns
+from bushfit.reading.headers import SWEEP_COLUMNS, Vocabulary, split_unit
 from bushfit.reading.layout import WITH_UNIT, Layout, Line, is_comment, is_row, is_summary_row, is_units_row
 from bushfit.reading.names import (
     NO_LABELS,
-    Labels,
     labels_above,
-    labels_and_text_above,
-    labels_in_names,
     named_direction,
-    named_quantities,
 )
 from bushfit.reading.numerals import is_like_number, plainest_value
-from bushfit.reading.roles import CONDITIONS
 from bushfit.reading.source import Channels, RowSource, Sheet, Text, cells_of
 
 #: Largest text that is searched for blocks without their own headers [bytes]; chosen: some 100,000 rows.
@@ -35,10 +31,6 @@ _NUMERIC = b"0123456789.,+-eEdD \t\r\n"
 _COMPLEX = re.compile(
     r"\(?\s*([+-]?[\d.,]+(?:[eEdD][+-]?\d+)?)\s*([+-]\s*[\d.,]+(?:[eEdD][+-]?\d+)?)\s*\*?\s*[ij]\s*\)?"
 )
-#: Names of the runs of a test, in the titles of blocks.
-_RUNS = Vocabulary({"repeat": SWEEP_COLUMNS["repeat"]})
-#: Direction or part of a block whose lines state none, unlike those of another block.
-_NOT_STATED = "not stated"
 #: First rows that are searched for complex numbers and units; chosen: room for remarks.
 _FIRST = 8
 
@@ -121,12 +113,8 @@ def combined(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> tuple
         blocks = _stacked_blocks(source, layout, vocabulary)
     if len(blocks) < 2:
         return _with_plain_cells(source, layout)
-    titles = [block.above[-1].text if block.above else "" for block in blocks]
-    labels = [_block_labels(block, title) for block, title in zip(blocks, titles, strict=True)]
-    labels = list(accumulate(labels, _continued))
-    known = vocabulary.roles(layout.headers)
-    added = _label_columns(labels, titles if sides else [], known)
-    added |= _named_columns(blocks, vocabulary, known | vocabulary.roles([*added]))
+    titles = [block.above[-1].text if block.above else "" for block in blocks] if sides else []
+    added = label_columns([block.above for block in blocks], titles, vocabulary, vocabulary.roles(layout.headers))
     numbers, content, width = list[int](), list[Sequence[str | float]](), len(layout.headers)
     for index, row in ((index, row) for index, block in enumerate(blocks) for row in block.rows):
         cells, texts = cells_of(row, layout.delimiter), [column[index] for column in added.values()]
@@ -135,9 +123,10 @@ def combined(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> tuple
         numbers.append(row.number)
     layout = replace(layout, headers=(*layout.headers, *added), units=(*layout.units, *[""] * len(added)))
     head = [line for line in source.head() if line.number < layout.header_line]
-    in_rows = {header.partition(" ")[0] for header in added}.intersection(CONDITIONS)
     of_titles = {line.number for block in blocks for line in block.above}
-    above = [line for line in head if not (line.number in of_titles if sides else _is_of_block(line, in_rows))]
+    above = [
+        line for line in head if not (line.number in of_titles if sides else is_of_block(line, [*added], vocabulary))
+    ]
     return _with_plain_cells(Sheet(source.sheet or "", content, above=above, numbers=numbers), layout)
 
 
@@ -280,82 +269,6 @@ def _stacked_blocks(source: RowSource, layout: Layout, vocabulary: Vocabulary) -
             blocks[-1].above.extend(labels if begins else ())
             blocks[-1].rows.extend(rows)
     return blocks
-
-
-def _block_labels(block: Segment, title: str) -> Labels:
-    """Labels of a block in the lines above it, the last of which is its title."""
-    labels = labels_and_text_above(block.above) | labels_in_names(title)
-    return replace(labels, direction=labels.direction or named_direction(line.text for line in block.above))
-
-
-def _continued(before: Labels, labels: Labels) -> Labels:
-    """Labels of a block after another: all but its amplitude and frequency apply until others are stated."""
-    return replace(labels | before, quantities=labels.quantities)
-
-
-def _is_of_block(line: Line, conditions: set[str]) -> bool:
-    """True if a line above the first block states a quantity, or one of the conditions, of this block alone."""
-    labels = labels_and_text_above([line])
-    return bool(labels.quantities) or any(getattr(labels, key) for key in conditions)
-
-
-def _label_columns(labels: Sequence[Labels], parts: Sequence[str], roles: set[str]) -> dict[str, list[str | float]]:
-    """Columns to add to a table, so that its rows show the block from which they come.
-
-    Args:
-        labels: labels of each block.
-        parts: name of the part in each block, used if no quantity distinguishes the blocks.
-        roles: roles for which the blocks already have a column.
-
-    Returns:
-        One text or number per block, by header: quantities that all blocks state, direction, part, and block number.
-    """
-    columns: dict[str, list[str | float]] = {}
-    quantities = [("amplitude", [label.of_dimension(si) for label in labels]) for si in ("m", "rad", "1")]
-    for role, by_block in [*quantities, ("frequency", [label.of_dimension("Hz") for label in labels])]:
-        kinds = {(one.unit, one.convention) for matches in by_block for one in matches}
-        if role not in roles and len(kinds) == 1 and all(len(matches) == 1 for matches in by_block):
-            unit, convention = kinds.pop()
-            columns[f"{role}{COUNTED[convention]} [{unit}]"] = [float(one.text.split()[0]) for (one,) in by_block]
-    for role in CONDITIONS:
-        texts = [(getattr(label, role) or "").strip().partition(" ") for label in labels]
-        in_units = {unit for number, _, unit in texts if number}
-        if role not in roles and len(in_units) == 1:
-            columns[f"{role} [{in_units.pop()}]"] = [float(number) if number else "" for number, *_ in texts]
-    if any(label.direction for label in labels):
-        columns["direction"] = [label.direction or _NOT_STATED for label in labels]
-    are_runs = all(_RUNS.heading(title.rstrip(" #.0123456789")) for title in parts)
-    numbers = [label.specimen_number or _NOT_STATED for label in labels]
-    named = numbers if set(numbers) != {_NOT_STATED} else [] if columns else parts
-    if len(set(named)) > 1:
-        columns["repeat" if named == parts and are_runs else "part"] = list(named)
-    columns["block"] = [str(number) for number in range(1, len(labels) + 1)]
-    return columns
-
-
-def _named_columns(blocks: Sequence[Segment], vocabulary: Vocabulary, roles: set[str]) -> dict[str, list[str | float]]:
-    """Columns for the other quantities that the lines above all blocks state by name, if they differ.
-
-    Args:
-        blocks: blocks with the lines above them.
-        vocabulary: known column names.
-        roles: roles that have a column already.
-
-    Returns:
-        One number per block, by header.
-    """
-    stated = [dict(item for line in block.above for item in named_quantities(line).items()) for block in blocks]
-    columns: dict[str, list[str | float]] = {}
-    for name in stated[0] if all(stated) else ():
-        numbers, in_units = zip(*(block.get(name, ("", "")) for block in stated), strict=True)
-        if not name or len(set(in_units)) > 1 or len(set(numbers)) == 1 or not units.is_unit(in_units[0]):
-            continue
-        heading = vocabulary.heading(f"{name} [{in_units[0]}]")
-        if heading is None:  # no numbers, because its unit says nothing about its role
-            columns[name] = [f"= {number} {in_units[0]}" for number in numbers]
-        elif heading.role in CONDITIONS and heading.role not in roles:
-            columns[f"{name} [{in_units[0]}]"] = [float(number) for number in numbers]
-    return columns
 
 
 def _with_plain_cells(source: RowSource, layout: Layout) -> tuple[RowSource, Layout]:

@@ -1,0 +1,85 @@
+"""Columns for the quantities that titles and lines above the blocks of a table state.
+
+A stated value holds for the rows of its block. A condition, a direction and a part hold until others are stated.
+"""
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+from bushfit import units
+from bushfit.reading.headers import COUNTED, SWEEP_COLUMNS, Vocabulary
+from bushfit.reading.layout import Line
+from bushfit.reading.names import labels_and_text_above, labels_in_names, named_direction, named_quantities
+from bushfit.reading.roles import CONDITIONS
+
+#: Names of the runs of a test, in the titles of blocks.
+_RUNS = Vocabulary({"repeat": SWEEP_COLUMNS["repeat"]})
+#: Roles whose values hold until others are stated, with the value for blocks before the first one.
+_HOLDING = {**dict.fromkeys(CONDITIONS, ""), "direction": "not stated", "part": "not stated"}
+
+
+def label_columns(
+    above: Sequence[Sequence[Line]], parts: Sequence[str], vocabulary: Vocabulary, roles: set[str]
+) -> dict[str, list[str | float]]:
+    """Make columns that show what is stated above the block from which a row comes.
+
+    Args:
+        above: lines above each block.
+        parts: name of the part in each block, used if nothing else distinguishes the blocks.
+        vocabulary: known column names.
+        roles: roles for which the blocks already have a column.
+
+    Returns:
+        One text or number per block, by header: quantities that all blocks state, conditions, direction, part, and
+        block number.
+    """
+    stated = [stated_above(lines, vocabulary) for lines in above]
+    for before, after in pairwise(stated):
+        new = set(map(_role, after))
+        after |= {header: value for header, value in before.items() if _role(header) in {*_HOLDING} - new}
+    columns: dict[str, list[str | float]] = {}
+    for header in dict.fromkeys(header for one in stated for header in one):
+        role = _role(header)
+        values = [one.get(header, _HOLDING.get(role)) for one in stated]
+        distinguishes = len(set(values)) > 1 or role in ("amplitude", "frequency", "direction", *CONDITIONS)
+        if role not in roles and distinguishes and None not in values:
+            columns[header] = [value for value in values if value is not None]
+    if not columns and len(set(parts)) > 1:
+        are_runs = all(_RUNS.heading(part.rstrip(" #.0123456789")) for part in parts)
+        columns["repeat" if are_runs else "part"] = list(parts)
+    return columns | {"block": [str(number) for number in range(1, len(stated) + 1)]}
+
+
+def is_of_block(line: Line, columns: Sequence[str], vocabulary: Vocabulary) -> bool:
+    """Return True if a line above the first block states a quantity, or one of these columns, of this block alone."""
+    stated = stated_above([line], vocabulary)
+    return any(header in columns or _role(header) in ("amplitude", "frequency") for header in stated)
+
+
+def stated_above(lines: Sequence[Line], vocabulary: Vocabulary) -> dict[str, str | float]:
+    """Values that the lines above a block state, the last of which is its title, by header of a column."""
+    labels = labels_and_text_above(lines) | labels_in_names(lines[-1].text if lines else "")
+    stated: dict[str, str | float] = {}
+    for si in ("m", "rad", "1", "Hz"):
+        matches, role = labels.of_dimension(si), "frequency" if si == "Hz" else "amplitude"
+        if len(matches) == 1:
+            stated[f"{role}{COUNTED[matches[0].convention]} [{matches[0].unit}]"] = float(matches[0].text.split()[0])
+    for role in CONDITIONS:
+        number, _, unit = (getattr(labels, role) or "").strip().partition(" ")
+        stated |= {f"{role} [{unit}]": float(number)} if number else {}
+    if direction := labels.direction or named_direction(line.text for line in lines):
+        stated["direction"] = str(direction)
+    if labels.specimen_number:
+        stated["part"] = labels.specimen_number
+    for name, (number, unit) in (item for line in lines for item in named_quantities(line).items()):
+        heading = vocabulary.heading(f"{name} [{unit}]")
+        if heading is None and name and units.is_unit(unit):
+            stated[name] = f"= {number} {unit}"  # a text, because the unit says nothing about its role
+        elif heading and heading.role in CONDITIONS:
+            stated.setdefault(f"{heading.role} [{unit}]", float(number))
+    return stated
+
+
+def _role(header: str) -> str:
+    """Role in the header of a column that states a quantity: "amplitude" of "amplitude p-p [mm]"."""
+    return header.partition(" ")[0]
