@@ -91,6 +91,7 @@ def command(source: Path, campaign: Path | None, aim: Aim | None, output: Output
     from bushfit.campaign.campaign import Campaign, load_campaign
     from bushfit.commands.loading import load_source
     from bushfit.commands.plan import plan, plan_files
+    from bushfit.commands.provenance import input_files
 
     parameters, rivals, targets = settings["parameters"], settings["rivals"], dict(settings.pop("targets"))
     if aim not in (None, "rivals") and rivals:
@@ -107,7 +108,8 @@ def command(source: Path, campaign: Path | None, aim: Aim | None, output: Output
     with error_location(source):
         planned = plan(opened, settings_campaign, aim=aim or implied, targets=targets, **settings)
     _print_plan(output, planned)
-    output.write(folder, plan_files(planned), planned.document, [source, *([campaign] if campaign else [])])
+    read = input_files(opened if isinstance(opened, Campaign) else settings_campaign, source)
+    output.write(folder, plan_files(planned), planned.document, read)
     if planned.tests:
         output.print(f"next: make the tests in the order of {folder / output.formats.table('plan')}")
     if missed := [name for name, target in planned.document["targets"].items() if not target["met"]]:
