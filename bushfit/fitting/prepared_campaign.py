@@ -291,12 +291,13 @@ class PreparedCampaign:
             if selected.any():
                 return sweep.select(selected)
         levels = sorted({float(x) for sweep in sweeps for x in sweep.amplitude})
+        unit, factor = sweeps[0].direction.display.displacement
         raise FitError(
             "no sweep at these amplitudes",
             file=self.campaign.path,
             place="[fit] dynamic_amplitudes",
-            found=", ".join(f"{x:.4g}" for x in wanted),
-            expected="some of " + ", ".join(f"{x:.4g}" for x in levels),
+            found=", ".join(f"{factor * x:.4g}" for x in wanted) + f" {unit}",
+            expected="some of " + ", ".join(f"{factor * x:.4g}" for x in levels) + f" {unit}",
         )
 
 

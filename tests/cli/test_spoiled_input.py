@@ -1,11 +1,13 @@
 """Spoiled input of every kind, to every command: status 2, one error that says what and where, nothing written, and
 no more memory or time than a command may take."""
 
+import ast
 import errno
 import json
 import re
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -77,6 +79,52 @@ def test_a_disk_that_fills_up_after_the_work(command, folder, monkeypatch):
 def test_every_command_is_among_them():
     commands = {row.command[0] for row in ROWS}
     assert set(cli.commands or cli.list_commands(None)) <= commands  # type: ignore[arg-type]
+
+
+#: Errors that no test expects: of schedulers, compilers and systems that are not here, and what other words check.
+UNEXPECTED = {
+    "a Prony series needs a long term modulus",
+    "a rig or sleeve is too compliant to be simulated in time", "module | has no attribute", "no FMU for this system",
+    "no Dask worker is left", "no worker process starts", "the columns do not fit together",
+    "the compiler of the FMU failed", "the connection to the Dask scheduler is lost",
+    "the effect | of | cannot be imported",
+    "the effect is Python code which bushfit runs only with your permission", "the files contain several directions",
+    "the headers do not state how amplitudes are counted", "the law cannot be run", "the results do not fit together",
+    "the results have different kinds of motion", "the static and the dynamic fit do not converge in turn",
+    "matplotlib cannot read its settings and no picture is drawn", "the tests to simulate are not stated",
+    "there are results already", "this cannot be compared", "this format represents one bushing",
+    "too few points for the fit",
+}  # fmt: skip
+
+
+def test_every_error_is_expected_by_a_test(root):
+    """Three words of its sentence at least: where it is no longer raised, that test fails."""
+    files = [file for ending in ("py", "toml") for file in (root / "tests").rglob(f"*.{ending}")]
+    texts = [file.read_text(encoding="utf-8").replace("\\n", " ") for file in files if file != Path(__file__)]
+    expected = " ".join(re.findall(r"\w+", re.sub(r"[\"']", " ", " ".join(texts))))
+    told = {*sentences(root / "bushfit")}
+    assert {each for each in told if not any(words in expected for words in threes(each))} == UNEXPECTED
+
+
+def threes(sentence: str) -> list[str]:
+    """Every three words in a row of each part of a sentence, between the values in it."""
+    parts = [part.split() for part in sentence.split(" | ")]
+    return [" ".join(words[first : first + 3]) for words in parts for first in range(len(words) - 2)]
+
+
+def sentences(package: Path) -> Iterator[str]:
+    """The sentence of each error in the code, its words alone, if three follow each other."""
+    for file in package.rglob("*.py"):
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            if (
+                isinstance(node, ast.Call)
+                and node.args
+                and re.search(r"\b\w*(Error|\.error)\(", ast.unparse(node)[:60])
+            ):
+                texts = [part.value for part in ast.walk(node.args[0]) if isinstance(part, ast.Constant)]
+                sentence = " | ".join(" ".join(re.findall(r"\w+", str(text))) for text in texts)
+                if threes(sentence):
+                    yield sentence
 
 
 def bounded(folder: Path, *arguments: str, times: int = 1) -> Done:
