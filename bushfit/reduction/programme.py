@@ -7,6 +7,7 @@ the parts are omitted.
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -29,6 +30,11 @@ _SAME_RATE = 0.08
 _SAME_AMPLITUDE = 0.08
 #: Distance from an end of the record, relative to a cycle, up to which a part is extended to that end.
 _AT_END = 0.1
+#: Largest change in an eighth of a period, relative to the range, of a motion at rest, and smallest share of rest in a
+#: pause between two parts; chosen: a sine changes so little at its turning points, in 5 % of its rows.
+_AT_REST, _PAUSE_SHARE = 0.03, 0.15
+#: Number of cycles below which a part between two equal parts is their pause with the strokes beside it.
+_ONE_CYCLE = 1.2
 #: Smallest reported softening: absolute, and over the loss factor for a part after other cycles and a part from rest;
 #: chosen: less does not matter to a fit, and the memory of springpot and friction makes up to 0.15 and 0.6 of the loss
 #: factor.
@@ -93,6 +99,9 @@ def split_record(loop: Loop, test: LoopFile = _TIMED) -> tuple[Loop, ...]:
     if not spans:
         return (loop,)
     if all(span.is_like(spans[0]) for span in spans[1:]):
+        if any(_is_pause(time, motion, before.end, after.begin, before) for before, after in pairwise(spans)):
+            longest = max(spans, key=lambda span: round(span.cycles))  # the mean cycle of several sets would cancel
+            return tuple(replace(part, name=loop.name) for part in cut_loops(loop, time, [longest], test))
         return (replace(loop, softening=measure_softening(loop, spans[0], from_rest=True)),)
     return tuple(cut_loops(loop, time, spans, test))
 
@@ -133,10 +142,14 @@ def steady_spans(loop: Loop, time: Floats, motion: Floats) -> list[SteadySpan]:
             period, stroke = 2.0 * (end - begin) / (last - first), float(np.median(size[first : last + 1]))
             span, previous = SteadySpan(begin, end, period, stroke), spans[-1] if spans else None
             gap = (begin - previous.end) / previous.period if previous else np.inf
-            if previous and previous.is_like(span) and resumes_in_phase(gap, step=0.5):
+            is_alike = previous and previous.is_like(span) and not _is_pause(time, motion, previous.end, begin, span)
+            if previous and is_alike and resumes_in_phase(gap, step=0.5):
                 spans[-1] = replace(previous, end=end)  # a disturbance broke it off
             else:
                 spans.append(span)
+    between = zip(spans, spans[1:], spans[2:], strict=False)
+    bridges = [span for before, span, after in between if span.cycles < _ONE_CYCLE and before.is_like(after)]
+    spans = [span for span in spans if span not in bridges]
     inner = size[1:-1]
     if not spans and inner.size >= 4 and np.ptp(np.log(inner)) > 0.3:  # no rig misses its amplitude by a third
         unit, factor = loop.direction.display.displacement
@@ -153,6 +166,20 @@ def steady_spans(loop: Loop, time: Floats, motion: Floats) -> list[SteadySpan]:
     before = [float(time[0]), *(span.end for span in spans[:-1])]
     after = [*(span.begin for span in spans[1:]), float(time[-1])]
     return [_extend_span(span, time, motion, *limits) for span, *limits in zip(spans, before, after, strict=True)]
+
+
+def _is_pause(time: Floats, motion: Floats, begin: float, end: float, span: SteadySpan) -> bool:
+    """Return True if the motion rests for a while between two parts of a record.
+
+    Args:
+        time: time of each row [s], or row numbers, (n,).
+        motion: displacement [m or rad], (n,).
+        begin, end: end of the first part and beginning of the second, in the unit of the time.
+        span: one of the parts.
+    """
+    rows = slice(*np.searchsorted(time, (begin, end)))
+    change = shifted_difference(time, motion, span.period / 8.0, rows)
+    return change.size > 0 and float(np.mean(change < _AT_REST * span.range)) > _PAUSE_SHARE
 
 
 def _alike_runs(values: Floats, reach: Floats) -> Iterator[slice]:
