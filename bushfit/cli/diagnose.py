@@ -141,9 +141,9 @@ def _print_gap(output: Output, document: Mapping[str, Any], changed: bool) -> No
     held_out = gap["heldout"]
     cells = [f"{held_out[when]:.2f}" for when in ("before", "after")] if held_out else ["not testable", ""]
     rows = (("held out", *cells), ("data fitted", *(f"{value:.2f}" for value in gap["calibration"].values())))
-    title = "gap (measured minus model) in units of the noise; 1: noise alone" + "; nothing was added" * (
-        document["verdict"] != "consistent" and not changed
-    )
+    title = "gap (measured minus model) in units of the noise; 1: noise alone"
+    if document["verdict"] != "consistent" and not changed:
+        title += "; nothing was added, and all tests were fitted"
     output.print_table(title, ("", "before", "after"), rows)
     if usable:
         how = "of the points, each predicted by a fit without it" if usable["held_out"] else "of the fitted points"

@@ -53,7 +53,7 @@ _Read = TypeVar("_Read")
 )
 @metadata_options()
 @option_group("Output", flag("--no-input", "Ask no questions; report missing information as an error."))
-@with_output("results/<bushing name>")
+@with_output("results/<bushing name>", target="Write to this folder, or to this TOML file")
 def command(files: tuple[Path, ...], name: str | None, no_input: bool, output: Output, **sizes: Any) -> None:
     """Write a campaign from test files and the geometry of the bushing.
 

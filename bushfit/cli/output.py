@@ -209,12 +209,13 @@ class Output:
         self.print(f"wrote {', '.join(written)} to {folder}")
 
 
-def with_output(folder: str, *written: Written) -> Parameter:
+def with_output(folder: str, *written: Written, target: str = "Write the results to this folder") -> Parameter:
     """Create the options shared by all commands, whose functions receive them as one argument `output`.
 
     Args:
         folder: default results folder, with a placeholder such as <campaign name> for the name of the result.
         written: kinds of result file whose formats can be chosen.
+        target: beginning of the help of --output.
     """
 
     def start(context: click.Context, values: dict[str, Any]) -> Output:
@@ -232,7 +233,7 @@ def with_output(folder: str, *written: Written) -> Parameter:
 
     return option_group(
         "Output",
-        option("-o --output DIR", f"Write the results to this folder [{folder}].", type=Folder(path_type=Path)),
+        option("-o --output DIR", f"{target} [{folder}].", type=Folder(path_type=Path)),
         flag("--force", "Replace earlier results in this folder."),
         *(_FORMAT_OPTIONS[kind] for kind in written),
         flag("--no-plots", "Do not write plots.", hidden="pictures" not in written),

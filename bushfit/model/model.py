@@ -256,7 +256,9 @@ class Model:
           mu = 1.09 MPa
         """
         branches = " + ".join(effect.equation for effect in self.structure.branches)
-        lines = [f"K = k ({branches}); k: stiffness of this shape for a modulus of 1"]
+        symbols = "k: stiffness of this shape for a modulus of 1; omega: angular frequency"
+        friction = "; A, B: stress in and out of phase at the strain amplitude e0" * ("A + iB" in branches)
+        lines = [f"K = k ({branches}); {symbols}{friction}"]
         lines += [f"  {effect.name}: {effect.equation}" for effect in self.records if not isinstance(effect, Branch)]
         for name, parameter in self.parameters.items():
             unit, factor = display_unit(parameter.unit, 1.0, self.values[name])
