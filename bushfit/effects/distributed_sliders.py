@@ -58,12 +58,15 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
     >>> modulus({"delta": 1e6, "e_s": 0.01, "spread": 1.0}, 1.0, np.array([1e-4, 0.01, 1.0])).round(-3)
     array([1000000.     +0.j,  762000.+119000.j,    5000. +20000.j])
     """
-    e_s, spread = np.atleast_1d(p["e_s"]), np.atleast_1d(p["spread"])
-    strain = np.maximum(strain, 1e-30 * e_s)
-    nodes = _standard_strain(strain[..., None] * _STRAINS, e_s[..., None], spread[..., None])
-    z = _standard_strain(strain, e_s, spread)
-    first, second = ((e_s / strain) ** j * np.exp(0.5 * (j * spread) ** 2) * ndtr(z - j * spread) for j in (1, 2))
-    return p["delta"] * (ndtr(-nodes) @ _WEIGHTS + 4.0j / np.pi * (first - second))
+    spread = np.atleast_1d(p["spread"])
+    ratio = np.maximum(strain / np.atleast_1d(p["e_s"]), 1e-30)
+    # many points have the same strain, and many models the same spread: one integral for each distinct pair
+    pairs, index = np.unique(ratio + 1j * spread, return_inverse=True)
+    nodes = _standard_strain(pairs.real[:, None] * _STRAINS, 1.0, pairs.imag[:, None])
+    storage = (ndtr(-nodes) @ _WEIGHTS)[index.reshape(np.broadcast_shapes(ratio.shape, spread.shape))]
+    z = _standard_strain(ratio, 1.0, spread)
+    first, second = (ratio**-j * np.exp(0.5 * (j * spread) ** 2) * ndtr(z - j * spread) for j in (1, 2))
+    return p["delta"] * (storage + 4.0j / np.pi * (first - second))
 
 
 def _first_loading(strain: Array, e_s: Value, spread: Value) -> Array:

