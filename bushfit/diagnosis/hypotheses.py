@@ -243,14 +243,14 @@ class SearchState:
 
         The covariance includes errors of the rig, and a smooth deviation and a fast relaxation of the rubber.
         """
-        bare, values = self.bare, self.bare.model.values
+        bare, values, rig = self.bare, self.bare.model.values, self.columns.errors
+        rig = replace(rig, cases=[rig.cases[n] for n in self._likely_cases])
         group = compound(bare, MAXIMUM_NODES)
-        deviation = CompoundDeviation(group, self.columns.errors) if group else None
-        linear = replace(self.linear, compound=deviation)
+        linear = replace(self.linear, rig=rig, compound=CompoundDeviation(group, rig) if group else None)
         moves = self.has_influence
         slopes, count = bare.coordinates.slopes(values)[moves], np.count_nonzero(moves)
         names = tuple(np.array(bare.names)[moves].tolist())
-        mean, covariance = linear.parameters(self._likely_cases, fast_relaxation(bare))
+        mean, covariance = linear.parameters(fast_relaxation(bare))
         steps = dict(zip(names, slopes * mean[:count], strict=True))
         means = {name: float(np.clip(values[name] + x, *get_parameter(name).bounds)) for name, x in steps.items()}
         fitted = Covariance(names, covariance[:count, :count] * np.outer(slopes, slopes))

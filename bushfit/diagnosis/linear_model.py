@@ -246,11 +246,10 @@ class LinearModel:
         freedom = max(self.residual.size - int(np.count_nonzero(self.precision == 0.0)), 1)
         return float(np.exp(base - np.logaddexp.reduce(base)) @ chdtrc(freedom, self.over_cases[1]))
 
-    def parameters(self, cases: Array, relaxation: Array) -> tuple[Array, Array]:
+    def parameters(self, relaxation: Array) -> tuple[Array, Array]:
         """Posterior of the changes of the k parameters from their fitted values, averaged over noise cases.
 
         Args:
-            cases: indices of the noise cases.
             relaxation: change of the n residuals by a relaxation of the rubber faster than the tests, (n,). A rubber
                 that deviates from the model may have one, with a size of `priors.SIZES`.
 
@@ -262,16 +261,16 @@ class LinearModel:
         """
         rows = np.concatenate((self.jacobian, relaxation[None]))
         groups = GroupSet((Group(rows, np.eye(len(rows)), act_together=True),), self.rig)
-        alone = replace(self, jacobian=self.jacobian[:0], precision=self.precision[:0]).project(cases)
+        alone = replace(self, jacobian=self.jacobian[:0], precision=self.precision[:0]).project(self.cases)
         ((_, projections, grams),) = alone.products(groups)
         wide = np.append(self.precision, np.square(_SMALL / SIZES[-1]))
         scale, information = _scale_information(grams[:, 0], rows, wide)
         covariance = np.linalg.inv(information) / np.outer(scale, scale)
         shift = np.einsum("nij,nj->ni", covariance, projections[:, 0])
         amount, variance, along = shift[:, -1:], covariance[:, -1, -1:], covariance[:, :, -1]
-        deviates = self.rig.deviation[cases] > 0.0
+        deviates = self.rig.deviation[self.cases] > 0.0
         total = variance + np.square(SIZES) * deviates[:, None]  # (cases, sizes)
-        base = np.where(self.rig.is_plain[cases] | deviates, self.project(cases).base, -np.inf)
+        base = np.where(self.rig.is_plain[self.cases] | deviates, self.over_cases[0], -np.inf)
         gain = 0.5 * (np.log(variance / total) + np.square(amount) * (1.0 / variance - 1.0 / total))
         share = softmax(base[:, None] + gain)
         means = shift[:, None] - along[:, None] * (amount / total)[..., None]

@@ -68,8 +68,8 @@ class RigRows:
             errors = errors.reshape(blocks, count, width, size).transpose(1, 3, 0, 2)
             shared = other.shared[number].reshape(blocks * width, len(other.rows))
             among_errors = errors.reshape(count * size, blocks * width) @ shared  # in one product, which is fast
-            plain = self.rows * weights[number] @ other.rows.T
-            products[chosen] = plain - among_errors.reshape(count, size, len(other.rows))
+            among_errors = among_errors.reshape(count, size, len(other.rows))
+            products[chosen] = np.subtract(self.rows * weights[number] @ other.rows.T, among_errors, out=among_errors)
         return products
 
 

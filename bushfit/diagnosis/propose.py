@@ -50,13 +50,13 @@ class Proposal(Explanation):
     visible: bool
 
 
-def proposals(fit: FitResult, excluded: Collection[str], fixed: Sequence[str]) -> list[Proposal]:
+def proposals(fit: FitResult, excluded: Collection[str], fixed: Sequence[str] | None) -> list[Proposal]:
     """Rank the effects of the library that a fitted model lacks by their expected decrease of chi-square.
 
     Args:
         fit: the fitted model and the tests.
         excluded: names of effects not to consider, with effects of the same response (twins).
-        fixed: names of parameters that are not fitted.
+        fixed: names of parameters that are not fitted; None to leave out the effects that replace a branch.
 
     Returns:
         One proposal for each effect, at its best shape parameters, the highest score first.
@@ -69,7 +69,8 @@ def proposals(fit: FitResult, excluded: Collection[str], fixed: Sequence[str]) -
     for effect in missing_effects(fit.model, places, excluded):
         family = effect.name.partition(".")[0]
         if effect.replaces is not None:
-            if effect.replaces in fit.model.effects and (start := _replacement(fit, effect, fixed)):
+            replaced = fixed is not None and effect.replaces in fit.model.effects
+            if replaced and (start := _replacement(fit, effect, fixed or ())):
                 ranked.append(Proposal("effect", family, effect.name, None, *start, visible=True))
             continue
         shapes, columns = sensitivity(fit.model, fit.data_sets, effect)

@@ -113,8 +113,8 @@ class Search:
                 effects = list[Proposal]()
                 if len(state.effects) < self._most_effects:
                     excluded = (*self.settings.without, *state.effects)
-                    is_root = state is self.root
-                    effects = self.proposals if is_root else proposals(state.bare, excluded, self.base.fixed)
+                    fixed = self.base.fixed if depth < ROUNDS else None  # the last round refits nothing
+                    effects = self.proposals if state is self.root else proposals(state.bare, excluded, fixed)
                 groups = [effect.group for effect in effects if effect.group]
                 evidence = state.weigh([*GroupSet.split(groups, state.columns.errors), *state.columns.sets])
                 explanations = [*(effect for effect in effects if effect.group), *state.tests.explanations]

@@ -22,6 +22,8 @@ from bushfit.effects.contract import Level
 #: Part of an explanation: its kind ("effect", "mistake", "unnamed", or `_FAULT` and the kind of a fault), and its name.
 _Part = tuple[str, Any]
 _FAULT = "fault: "
+#: Probability of a hypothesis below which it changes no figure: thousands of hypotheses are merged in each round.
+_NEGLIGIBLE = 1e-12
 #: Texts for the parts of an explanation that are no known effect.
 NAMELESS = "an unknown cause"
 LEVELS = "errors of levels beyond the class of the rig"
@@ -118,7 +120,8 @@ def decide_verdict(hypotheses: Sequence[Hypothesis], tolerance: float, *, gap_st
     weights = np.exp(log_posteriors - logsumexp(log_posteriors)).tolist()
     small = [not gap_stays and (h.change <= tolerance or not h.key) for h in hypotheses]
     nothing = sum(weight for weight, is_small in zip(weights, small, strict=True) if is_small)
-    large = [(h, weight) for h, weight, is_small in zip(hypotheses, weights, small, strict=True) if not is_small]
+    triples = zip(hypotheses, weights, small, strict=True)
+    large = [(h, weight) for h, weight, is_small in triples if not is_small and weight > _NEGLIGIBLE]
     if nothing >= NOTHING or not large:
         return Finding("consistent", nothing, ())
     compositions = compose(large)
