@@ -209,7 +209,7 @@ def sensitivity(
         rows = np.zeros((len(amounts), sum(data_set.size for data_set in data_sets)))  # the last without the effect
         for data_set, columns in zip(data_sets, residual_slices(data_sets), strict=True):
             if effect.acts_at(data_set.direction):
-                rows[:, columns] = data_set.residual(model, values)
+                rows[:, columns] = data_set.residual_of(data_set.response(model, values))
         is_finite = np.asarray(np.isfinite(rows).all(axis=1))
         shapes, rows = list(compress(shapes, is_finite)), rows[[*is_finite[:-1], True]]
         if is_finite[-1] or not shapes:

@@ -7,7 +7,7 @@ without a name comes from a linear model.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Collection, Hashable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -34,7 +34,6 @@ from bushfit.effects.mistakes import get_mistake
 from bushfit.errors import FitError, ModelError
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.problem import FitResult
-from bushfit.model.model import Model
 from bushfit.progress import track
 
 #: Maximum number of refits of hypotheses that are probable by the linear model alone; for time.
@@ -138,7 +137,10 @@ class Search:
             beam = [state for state in nearest if state.log_posterior > limit]
             if not beam:
                 break
-        self._refit_linear()
+        for linear in self._settle_linear():
+            assert isinstance(linear.last, Proposal)  # all else needs no refit
+            if not self._with_effects(linear.state, [linear.last], len(linear.state.key)):
+                del self._known[linear.key]  # no response with it, or far behind
         return self._ordered_hypotheses()
 
     def _ordered_hypotheses(self) -> list[Hypothesis]:
@@ -152,18 +154,17 @@ class Search:
             return finding.nothing >= NAMED and self.root.linear.p_value() >= DOES_NOT_FIT
         return finding.verdict == "named" and finding.reported[0].best.refitted
 
-    def _refit_linear(self) -> None:
-        """Refit, with all parameters, probable hypotheses whose evidence so far is from the linearised model."""
+    def _settle_linear(self) -> Iterator[Hypothesis]:
+        """Yield the most probable hypotheses that need a refit: their evidence still comes from the linear model alone."""
         for _ in range(_SETTLED):
             ordered = self._ordered_hypotheses()
             share = np.exp([hypothesis.log_posterior - ordered[0].log_posterior for hypothesis in ordered])
             ahead = (np.cumsum(share) - share) / share.sum()
             candidates = zip(ordered, ahead.tolist(), strict=True)
             linear = next((h for h, before in candidates if before < NAMED and not h.refitted), None)
-            if linear is None or not isinstance(linear.last, Proposal):
+            if linear is None:
                 return
-            if not self._with_effects(linear.state, [linear.last], len(linear.state.key)):
-                del self._known[linear.key]  # no response with it, or far behind
+            yield linear
 
     def _log_odds(self, kind: str, name: str, depth: int) -> float:
         """Natural log of the prior odds of one more explanation; the lowest odds of its kind if it has none of its own.
@@ -279,35 +280,18 @@ class Search:
             )
             if state.plain.reduced_chi_square > _BENT:  # perhaps by the part
                 starts = [{}] if state.effects else [{}, self.start]
-                fits = [fit for start in starts for fit in self._refits(grown, grown.fit.model, start)]
+                models, tests, columns = {"": grown.fit.model}, grown.fit.data_sets, grown.free_columns(0.0)
+                fits = [fit for s in starts for fit in self._fit_rivals(models, tests, s, columns=columns).values()]
                 grown = grown.with_fit(min(fits, key=lambda fit: fit.chi_square)) if fits else grown
             yield self._visit(grown)
 
-    def _refits(
-        self, state: SearchState, model: Model, start: Mapping[str, float], deviation: float = 0.0
-    ) -> Collection[FitResult]:
-        """Fit one model to the tests of a state, together with the errors of its faulty parts.
-
-        Args:
-            state: state with the tests and faulty parts.
-            model: model at its starting values.
-            start: further starting values, by parameter.
-            deviation: standard deviation of a smooth deviation of the rubber that is fitted as well, relative to |K|; 0
-                for none.
-
-        Returns:
-            The fit, as the only element; empty if the model has no finite response.
-        """
-        return self._fit_rivals({"": model}, state.fit.data_sets, start, columns=state.free_columns(deviation)).values()
-
     def _without_earlier(self, state: SearchState) -> Iterator[SearchState]:
         """Yield refitted states without one of the earlier effects, which the last effect may make unnecessary."""
-        earlier = () if state.faulty_parts else state.effects[:-1]
-        shorter = {name: state.fit.model.without(name) for name in earlier}
-        for name, model in shorter.items():
+        for name in () if state.faulty_parts else state.effects[:-1]:
+            model = state.fit.model.without(name)
             if state.key - {name} in self._visited or not all(has_used_parameters(e, model) for e in model.records):
                 continue
-            for fit in self._refits(state, model, {}):
+            for fit in self._fit_rivals({name: model}, state.fit.data_sets, {}).values():
                 yield self._visit(self._with_fit(state, [e for e in state.effects if e != name], fit))
 
     def _with_fit(self, state: SearchState, effects: Sequence[str], fit: FitResult) -> SearchState:
@@ -340,7 +324,8 @@ class Search:
         near.sort(key=lambda n: -states[n].log_posterior)
         for n in near[:_RIVALS] if leader.likeliest_deviation and not leader.faulty_parts else ():
             state, start = states[n], leader.fit.model.values
-            for fit in self._refits(state, state.fit.model, start, leader.likeliest_deviation):
+            columns = state.free_columns(leader.likeliest_deviation)
+            for fit in self._fit_rivals({"": state.fit.model}, state.fit.data_sets, start, columns=columns).values():
                 candidate = self._visit(self._with_fit(state, state.effects, fit))
                 states[n] = max(state, candidate, key=lambda rival: rival.log_posterior)
         return states
