@@ -155,7 +155,7 @@ class Search:
         return finding.verdict == "named" and finding.reported[0].best.refitted
 
     def _settle_linear(self) -> Iterator[Hypothesis]:
-        """Yield the most probable hypotheses that need a refit: their evidence still comes from the linear model alone."""
+        """Yield the most probable hypotheses that need a refit: their evidence is still that of the linear model."""
         for _ in range(_SETTLED):
             ordered = self._ordered_hypotheses()
             share = np.exp([hypothesis.log_posterior - ordered[0].log_posterior for hypothesis in ordered])
