@@ -119,15 +119,15 @@ class Search:
                 explanations = [*(effect for effect in effects if effect.group), *state.tests.explanations]
                 steps.append(_Step(state, effects, list(zip(explanations, evidence, strict=True))))
                 for explanation, of_explanation in steps[-1].evidence:
-                    log_odds = self._log_odds(explanation.kind, explanation.name, depth)
+                    log_odds = self._log_odds(explanation.kind, explanation.name)
                     self._note(state.extended(of_explanation, explanation, log_odds))
             if depth == ROUNDS or self._is_sure():
                 break
             fresh = list[SearchState]()
             for step in track("with one more", steps):
-                for grown in self._with_effects(step.state, self._promising(step, depth), depth):
+                for grown in self._with_effects(step.state, self._promising(step, depth)):
                     fresh += [grown, *self._without_earlier(grown)]
-                fresh += self._with_faulty_parts(step, depth)
+                fresh += self._with_faulty_parts(step)
             fresh = self._with_common_start([*beam, *fresh])[len(beam) :]
             if depth == 0:
                 fresh += self._corrected_records()
@@ -139,7 +139,7 @@ class Search:
                 break
         for linear in self._settle_linear():
             assert isinstance(linear.last, Proposal)  # all else needs no refit
-            if not self._with_effects(linear.state, [linear.last], len(linear.state.key)):
+            if not self._with_effects(linear.state, [linear.last]):
                 del self._known[linear.key]  # no response with it, or far behind
         return self._ordered_hypotheses()
 
@@ -166,18 +166,21 @@ class Search:
                 return
             yield linear
 
-    def _log_odds(self, kind: str, name: str, depth: int) -> float:
+    def _log_odds(self, kind: str, name: str) -> float:
         """Natural log of the prior odds of one more explanation; the lowest odds of its kind if it has none of its own.
 
         Args:
             kind: kind of the explanation.
             name: name of the explanation.
-            depth: number of explanations in the set to which it is added. Their order is irrelevant, so the odds are
-                divided by depth + 1.
+
+        Notes:
+            The prior assumes independent explanations: the odds of a set are the product of its members' odds. With the
+            sum O of all odds, all sets of n explanations together weigh O^n/n!, as a Poisson number of explanations of
+            mean O does; the search records a set only once, so no further factor corrects for the order.
         """
         if (kind, name) not in self._log_priors:
             self._log_priors[kind, name] = min(odds for (other, _), odds in self._log_priors.items() if other == kind)
-        return self._log_priors[kind, name] - log(depth + 1)
+        return self._log_priors[kind, name]
 
     def _visit(self, state: SearchState) -> SearchState:
         """Record a state of the search (a fitted model) and its hypotheses, to visit it only once; return the state."""
@@ -217,7 +220,7 @@ class Search:
         state = step.state
         by_evidence, by_score = REFITS[1 if depth else 2 if state.plain.reduced_chi_square > _BENT else 0]
         effects = [effect for effect in step.effects if state.key | {effect.name} not in self._visited]
-        prior = {effect.name: self._log_odds("effect", effect.name, 0) for effect in effects}
+        prior = {effect.name: self._log_odds("effect", effect.name) for effect in effects}
         base = state.log_weight - state.log_posterior
         gains = {e.name: base + prior[e.name] + evidence.total for e, evidence in step.evidence if e.name in prior}
         first = sorted((effect for effect in effects if effect.group), key=lambda effect: -gains[effect.name])
@@ -225,7 +228,7 @@ class Search:
         second = [effect for effect in effects if 0.5 * effect.score + prior[effect.name] > -_SLIGHT][:by_score]
         return list(dict.fromkeys([*first, *second]))
 
-    def _with_effects(self, state: SearchState, effects: Sequence[Proposal], depth: int) -> list[SearchState]:
+    def _with_effects(self, state: SearchState, effects: Sequence[Proposal]) -> list[SearchState]:
         """Extend a state of the search by each of several effects, refitted with all parameters.
 
         Each effect is fitted twice: without and with a smooth deviation of the rubber of the likeliest size. The search
@@ -234,7 +237,6 @@ class Search:
         Args:
             state: fitted model with some explanations.
             effects: effects to add, one at a time.
-            depth: number of explanations in the state.
         """
         if not effects:
             return []
@@ -244,22 +246,21 @@ class Search:
         for deviation in dict.fromkeys((state.likeliest_deviation, 0.0)):
             columns = state.free_columns(deviation)
             for name, fit in self._fit_rivals(models, state.fit.data_sets, start, columns=columns).items():
-                log_odds = self._log_odds("effect", name, depth)
+                log_odds = self._log_odds("effect", name)
                 candidate = self._visit(state.with_fit(fit).with_effect(name, log_odds, state.fit))
                 if name not in grown or candidate.log_posterior > grown[name].log_posterior:
                     grown[name] = candidate
         return list(grown.values())
 
-    def _with_faulty_parts(self, step: _Step, depth: int) -> Iterator[SearchState]:
+    def _with_faulty_parts(self, step: _Step) -> Iterator[SearchState]:
         """Extend a state by each of its likeliest faulty parts of the tests, with a common shift or an error per point.
 
         Args:
             step: state to extend, with the evidence for faulty parts.
-            depth: number of explanations that the state has.
         """
         state = step.state
         faulty_parts = [(part, evidence) for part, evidence in step.evidence if isinstance(part, FaultyPart)]
-        faulty_parts.sort(key=lambda pair: -(self._log_odds("part", pair[0].name, depth) + pair[1].total))
+        faulty_parts.sort(key=lambda pair: -(self._log_odds("part", pair[0].name) + pair[1].total))
         for part, shifted in faulty_parts[:_FAULTY_PARTS]:
             better, evidence = part, shifted
             if part.family != "loop":
@@ -268,7 +269,7 @@ class Search:
                 (of_points,) = state.weigh([groups])
                 if of_points.total > shifted.total:
                     better, evidence = scattered, of_points
-            log_odds = self._log_odds("part", part.name, depth)
+            log_odds = self._log_odds("part", part.name)
             improves = state.log_weight + log_odds + evidence.total > state.log_posterior
             if not improves or state.key | {part.name} in self._visited:
                 continue
@@ -303,8 +304,8 @@ class Search:
             fit: fit with all effects.
         """
         fitted = SearchState.of_tests(state.tests).with_fit(fit)
-        for order, name in enumerate(effects):
-            fitted = fitted.with_effect(name, self._log_odds("effect", name, order), fit)
+        for name in effects:
+            fitted = fitted.with_effect(name, self._log_odds("effect", name), fit)
         return fitted
 
     def _with_common_start(self, states: list[SearchState]) -> list[SearchState]:
