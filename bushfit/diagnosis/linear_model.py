@@ -50,7 +50,8 @@ class Projection:
         base: natural log of the prior weight of the case times the evidence without a further explanation, (c,).
         misfit: r^T P r of the residuals r, (c,).
         deviation: posterior mean of the amounts of the q modes of the compound's deviation, (c, q).
-        modes: inner products of the modes with the rows, (c, q, 1 + k), and the shrinkage of these products, (c, q).
+        modes: inner products of the modes with the rows, (c, q, 1 + k), each times the square root of the posterior
+            variance of the mode's amount without parameters; and this root, (c, q).
         root: Cholesky factor of the scaled information on the parameters, (c, k, k), and the scale, (k,).
         free: components of the residual along the parameters, (c, k).
     """
@@ -73,17 +74,16 @@ class Projection:
             width, width).
         """
         used, index = np.unique(self.rows.rig.combinations[1][self.cases], return_inverse=True)
-        (modes, shrinkage), (root, scale) = self.modes, self.root
-        smooth = groups.with_modes(self.compound, used)[index]
-        products = self.rows.inner(groups.rows, used)[index]
-        products -= (modes * shrinkage[..., None]).swapaxes(1, 2) @ smooth
+        (modes, spread), (root, scale) = self.modes, self.root
+        smooth = spread[..., None] * groups.with_modes(self.compound, used)[index]
+        products = self.rows.inner(groups.rows, used)[index] - modes.swapaxes(1, 2) @ smooth
         free = np.linalg.solve(root, products[:, 1:] / scale[:, None])
         projections = products[:, 0] - np.einsum("ck,ckg->cg", self.free, free)
+        absorbed = np.concatenate((smooth, free), axis=1).swapaxes(1, 2)  # (c, columns, q + k)
         for batch, within in zip(groups.batches, groups.within(used), strict=True):
-            absorbed = np.moveaxis(free[..., batch.columns], 1, -1)  # (c, blocks, width, k)
-            shrunk = np.moveaxis(smooth[..., batch.columns], 1, -1)
-            gram = within[index] - (shrunk * shrinkage[:, None, None]) @ shrunk.swapaxes(-1, -2)
-            yield batch, projections[:, batch.columns], gram - absorbed @ absorbed.swapaxes(-1, -2)
+            of_blocks = absorbed[:, batch.columns]
+            gram = within[index] - of_blocks @ of_blocks.swapaxes(-1, -2)
+            yield batch, projections[:, batch.columns], gram
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,23 +133,23 @@ class LinearModel:
         compound = self.compound if self.compound and deviates else CompoundDeviation(none, rig)
         combinations = rig.combinations[1][cases]
         used, index = np.unique(combinations, return_inverse=True)
-        modes = compound.inner(rows, used)[index]
         variance = np.square(rig.deviation[cases])[:, None]
         grown = 1.0 + variance * compound.modes[0][combinations]
-        shrinkage = variance / grown  # of the products with each mode
-        gram = rows.inner(rows, used)[index] - (modes * shrinkage[..., None]).swapaxes(1, 2) @ modes
+        spread = np.sqrt(variance / grown)
+        modes = spread[..., None] * compound.inner(rows, used)[index]
+        gram = rows.inner(rows, used)[index] - modes.swapaxes(1, 2) @ modes
         scale, information = _scale_information(gram[:, 1:, 1:], self.jacobian, self.precision)
         root = np.linalg.cholesky(information)
         free = np.linalg.solve(root, gram[:, 1:, :1] / scale[:, None])
         misfit = gram[:, 0, 0] - np.sum(np.square(free[..., 0]), axis=1)
         parameters = np.linalg.solve(root.swapaxes(1, 2), free) / scale[:, None]
-        deviation = shrinkage * (modes[..., 0] - (modes[..., 1:] @ parameters)[..., 0])
+        deviation = spread * (modes[..., 0] - (modes[..., 1:] @ parameters)[..., 0])
         log_det = rig.kernels[1][combinations] + np.sum(np.log(grown), axis=1)
         log_det += 2.0 * np.sum(np.log(np.einsum("ckk->ck", root) * scale), axis=1)
         log_det -= np.sum(np.log(self.precision[self.precision > 0.0]))
         base = rig.log_weight[cases] - 0.5 * (misfit + log_det)
-        shrunk, factor = (modes, shrinkage), (root, scale)
-        return Projection(rows, compound, cases, base, misfit, deviation, shrunk, factor, free[..., 0])
+        of_modes, factor = (modes, spread), (root, scale)
+        return Projection(rows, compound, cases, base, misfit, deviation, of_modes, factor, free[..., 0])
 
     @cached_property
     def over_cases(self) -> tuple[Array, Array, Array]:
