@@ -50,8 +50,8 @@ class FaultyPart(Explanation):
         frequency: lowest and highest frequency of the faulty points [Hz].
         amplitude: their smallest and largest amplitude, zero-to-peak [m or rad].
         may_be_physics: True if an effect that the model lacks could change the same points, and not a wrong test: the
-            smallest or largest level of a direction, a loop that no other test covers, or frequencies in all directions
-            at every amplitude.
+            smallest or largest level of a direction, a loop that no other test covers, or frequencies in
+            all directions at every amplitude.
         is_scattered: True if each point has an independent error; False for a common shift or slope.
         amount: prior standard deviation of each error, relative to |K|; 0 before the fault is part of an explanation.
     """
@@ -128,7 +128,7 @@ def is_pattern(faulty_parts: Sequence[FaultyPart]) -> bool:
     Such patterns are:
 
     - two or more frequencies of a sweep, as by a resonance, or the same frequency in every direction;
-    - the smallest or the largest level, as by a contact;
+    - the smallest or the largest level, as by a contact, unless the same level of another preload contradicts it;
     - two loops of the same direction, rate and amplitude.
 
     Returns:
@@ -237,17 +237,25 @@ def _level_label(sweep: MeasuredSweep, point: int) -> str:
 def _levels(fit: FitResult, sweeps: Sequence[MeasuredSweep]) -> Iterator[FaultyPart]:
     """Generate suspected faults of levels (constant amplitude or frequency), and of single repeats of a level.
 
-    A level is suspected only if the sweep has several, a repeat only if the level has three or more.
+    A level is suspected only if the sweep has several, a repeat only if the level has three or more. An effect of the
+    largest level, such as a contact, acts under every larger preload too, and one of the smallest under smaller ones.
     """
+    preloads = {sweep: abs(sweep.test.preload.value) if sweep.test.preload else 0.0 for sweep in sweeps}
     for sweep in sweeps:
-        levels_of_direction = [np.unique(member.held_value) for member in sweeps if member.direction == sweep.direction]
-        levels = np.concatenate(levels_of_direction)
+        members = [member for member in sweeps if member.direction == sweep.direction]
+        levels, preload = np.concatenate([np.unique(member.held_value) for member in members]), preloads[sweep]
         for level in np.unique(sweep.held_value):
             mask = sweep.held_value == level
             label = add_preload(_level_label(sweep, int(np.argmax(mask))), sweep.test.preload, sweep.direction)
             if levels.size > 1:  # in this file or in others
                 part = _common_fault(fit, "level", label, [sweep], [mask])
-                yield replace(part, may_be_physics=levels.size > 2 and level in (levels.min(), levels.max()))
+                others = [member for member in members if member is not sweep]
+                at = [
+                    preloads[test] for test in others if np.abs(np.log(test.held_value / level)).min() < np.log(_SAME)
+                ]
+                is_largest = level == levels.max() and all(preload > other for other in at)
+                is_smallest = level == levels.min() and all(preload < other for other in at)
+                yield replace(part, may_be_physics=levels.size > 2 and (is_largest or is_smallest))
             numbers = np.unique(sweep.repeat[mask])
             for repeat in numbers if numbers.size > 2 else ():
                 points = mask & (sweep.repeat == repeat)

@@ -133,8 +133,11 @@ class Search:
                 fresh += self._corrected_records()
             followed = [h for h in self._known.values() if h.unnamed in ("", COMPOUND) and not h.levels]
             limit = max(hypothesis.log_posterior for hypothesis in followed) - LOG_ODDS_CUTOFF
-            nearest = sorted(fresh, key=lambda state: -state.log_posterior)[: BEAM[min(depth, 1)]]
-            beam = [state for state in nearest if state.log_posterior > limit]
+            nearest = sorted(fresh, key=lambda state: -state.log_posterior)
+            beam = [state for state in nearest[: BEAM[min(depth, 1)]] if state.log_posterior > limit]
+            corrected = next((state for state in nearest if state.tests.claim), None)
+            if corrected and corrected not in beam and self._is_improved(corrected):
+                beam.append(corrected)  # tests with a mistake and an effect are explained by neither alone
             if not beam:
                 break
         for linear in self._settle_linear():
@@ -181,6 +184,12 @@ class Search:
         if (kind, name) not in self._log_priors:
             self._log_priors[kind, name] = min(odds for (other, _), odds in self._log_priors.items() if other == kind)
         return self._log_priors[kind, name]
+
+    def _is_improved(self, corrected: SearchState) -> bool:
+        """True if the correction of a recording mistake makes the same explanations more probable."""
+        assert corrected.tests.claim
+        uncorrected = self._known.get(corrected.key - {corrected.tests.claim.key})
+        return uncorrected is None or corrected.log_posterior > uncorrected.state.log_posterior
 
     def _visit(self, state: SearchState) -> SearchState:
         """Record a state of the search (a fitted model) and its hypotheses, to visit it only once; return the state."""

@@ -30,11 +30,23 @@ from bushfit.campaign.campaign import Campaign
 from bushfit.effects import BASE
 from bushfit.geometry import Bushing, Direction
 from bushfit.model.model import Model
+from bushfit.reading.preload import Preload
 from bushfit.simulation.measured import measure
 from bushfit.simulation.undisturbed import undisturbed
 
 #: The axial level of 0.2 mm.
 level_too_stiff = off(0, 1.05, amplitude=LEVELS[1])
+
+
+def test_a_level_under_one_of_two_preloads_is_measured_again(measured):
+    """The smallest level, which could be friction without a preload; under 500 N alone no effect changes it."""
+    axial = [
+        replace(measured(seed=seed).sweeps[0], name=f"{seed}", preload=Preload(500.0 * seed, "N")) for seed in (0, 1)
+    ]
+    campaign = replace(measured(), loops=(), sweeps=tuple(axial))
+    diagnosis = asked(off(1, 1.06, amplitude=LEVELS[0])(campaign))
+    assert diagnosis.verdict == "unexplained"
+    assert "measure again: the axial level 0.1 mm at a preload of 500 N" in diagnosis.next_test
 
 
 @pytest.mark.parametrize(
