@@ -127,7 +127,7 @@ def _print_plan(output: Output, plan: Plan) -> None:
     )
     runs = f"{len(document['tests'])} runs in {hours} h"
     misses = plan.knowledge.result.model_error is not None
-    condition, included = (", if the model were right", ", model error included") if misses else ("", "")
+    condition, included = (", without model error", ", with model error") if misses else ("", "")
     if rivals := document["rivals"]:
         chi_square, standard = (number(rivals[key], 3) for key in ("planned", "standard"))
         output.print(

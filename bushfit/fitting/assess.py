@@ -42,7 +42,7 @@ _MOST_STIFFENING = 20.0
 _ONE_TEMPERATURE = 3.0
 #: Strain amplitude that no filled rubber bears for long; chosen: tests reach a third, a wrong prefix is 1000 times.
 _MOST_STRAIN = 3.0
-_CHECK = "check the units of displacement and force, and the dimensions of what was tested"
+_CHECK = "check the units of displacement, force and stiffness, and the dimensions of what was tested"
 
 
 def covariance(

@@ -56,10 +56,10 @@ def test_a_plan_promises_parameters_only_if_the_model_were_right(bushfit, root, 
     source = root / "data" / case / "bushing.toml" if case else "model/model.json"
     printed = bushfit("plan", source, "--hours", "1", "--target", "mu=50 %", "-o", tmp_path / "x").stderr
     rows = [line for line in printed.splitlines() if line.split(",")[0].split() in (["mu"], ["sigma_fmax"])]
-    assert condition == (len([row for row in rows if ", if the model were right" in row]) >= 2)
-    assert condition == ("met, if the model were right" in printed)
-    assert condition == ("stiffness, axial, model error included" in printed)
-    assert condition == ("standard error of the stiffness, model error included: axial" in printed)
+    assert condition == (len([row for row in rows if ", without model error" in row]) >= 2)
+    assert condition == ("met, without model error" in printed)
+    assert condition == ("stiffness, axial, with model error" in printed)
+    assert condition == ("standard error of the stiffness, with model error: axial" in printed)
 
 
 @pytest.mark.parametrize(
