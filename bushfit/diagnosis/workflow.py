@@ -94,7 +94,7 @@ def diagnose(
     result = replace(
         diagnosis.result,
         outliers=(*of_loops, *excluded),
-        warnings=(*messages, *diagnosis.result.warnings, *warnings),
+        warnings=(*messages, *diagnosis.result.warnings, *data.preload_notes, *warnings),
         specimens=data.campaign.specimens,
     )
     return replace(diagnosis, notes=notes, result=result)

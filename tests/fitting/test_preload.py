@@ -22,6 +22,8 @@ from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import FitSettings
 from bushfit.commands.compare import compare
 from bushfit.commands.predict import predict as predict_files
+from bushfit.diagnosis.record import DiagnosisSettings
+from bushfit.diagnosis.workflow import diagnose
 from bushfit.errors import ModelError
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.procedures import fit_joint
@@ -147,10 +149,14 @@ def test_bands_hold_the_truth_within_the_tested_preloads(case, seeds):
 @pytest.mark.parametrize("preloads", [newtons(0.0, 800.0), metres(0.0, 1.5e-3), metres(5e-4, 1.5e-3)], ids=str)
 def test_two_preloads_of_a_symmetric_bushing_give_a_line_over_their_square(preloads):
     rubber, (low, high) = Rubber(c3=8.0), preloads
-    result = joint_fit(campaign(rubber, preloads, seed=1))
+    loaded = campaign(rubber, preloads, seed=1)
+    result = joint_fit(loaded)
     odd = [result.model.values[f"preload.{name}"] for name in ("c2", "friction", "rate")]
     assert odd == [0.0, 0.0, 0.0]
-    assert any("axial: 2 preloads, " in line and "straight line over the square" in line for line in result.warnings)
+    diagnosed = diagnose(PreparedCampaign.from_campaign(loaded), settings=DiagnosisSettings(max_effects=0)).result
+    for warned in (result, diagnosed):
+        lines = [line for line in warned.warnings if "straight line over the square" in line]
+        assert len(lines) == 1 and lines[0].startswith("axial: 2 preloads, ")
     middle = Preload(0.5 * (low.value + high.value), low.unit)
     between = predict(result, Direction.AXIAL, FREQUENCIES, AMPLITUDES, preload=middle)
     points = zip(between.frequency, between.amplitude, strict=True)
