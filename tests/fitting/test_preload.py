@@ -156,7 +156,8 @@ def test_two_preloads_of_a_symmetric_bushing_give_a_line_over_their_square(prelo
     diagnosed = diagnose(PreparedCampaign.from_campaign(loaded), settings=DiagnosisSettings(max_effects=0)).result
     for warned in (result, diagnosed):
         lines = [line for line in warned.warnings if "straight line over the square" in line]
-        assert len(lines) == 1 and lines[0].startswith("axial: 2 preloads, ")
+        assert len(lines) == 1
+        assert lines[0].startswith("axial: 2 preloads, ")
     middle = Preload(0.5 * (low.value + high.value), low.unit)
     between = predict(result, Direction.AXIAL, FREQUENCIES, AMPLITUDES, preload=middle)
     points = zip(between.frequency, between.amplitude, strict=True)
