@@ -20,7 +20,7 @@ from pydantic import BeforeValidator
 from bushfit import units
 from bushfit.reading.headers import WORDS, Vocabulary, plain, split_convention, split_unit
 from bushfit.reading.numerals import is_like_number
-from bushfit.reading.roles import stated_once
+from bushfit.reading.roles import is_test, stated_once
 
 #: First words of rows that summarise others.
 _SUMMARIES = frozenset(map(plain, WORDS["rows_of"]["summary"]))
@@ -197,6 +197,13 @@ def find_layout(
     if header_line is not None and not before:
         before = [index for index, line in enumerate(lines) if line.number == header_line]
     candidates = list(_candidates(lines, before, delimiters, vocabulary))
+    if header_line is None and not any(is_test(vocabulary.roles(cells)) for *_, cells in candidates):
+        below = _candidates(lines, range(end, len(lines)), delimiters, vocabulary)
+        if later := next((one for one in below if one[0][1] and is_test(vocabulary.roles(one[3]))), None):
+            _, index, delimiter, headers = later
+            note = f"lines {lines[0].number} to {lines[index].number - 1} contain another table, which is left out"
+            layout = _layout(lines, vocabulary, index, delimiter, headers)
+            return replace(layout, notes=(*layout.notes, note))
     best = max(candidates, key=lambda candidate: candidate[0], default=None)
     if best is None:
         return _layout(lines, vocabulary, *_likeliest(lines, before, end, delimiters))
@@ -392,6 +399,13 @@ def is_units_row(cells: Sequence[str]) -> bool:
     filled = [split_convention(cell.strip("[]() "))[0] for cell in cells if cell.strip("[]() ")]
     has_numbers = any(is_like_number(cell) and cell != "1" for cell in filled)
     return not has_numbers and 0 < len(filled) <= 2 * sum(units.is_unit(cell) for cell in filled)
+
+
+def begins_other_table(cells: Sequence[str]) -> bool:
+    """Return True if a row has names with units in brackets and no number, as the header of another table has."""
+    filled = [cell for cell in cells if cell]
+    in_brackets = [cell for cell in filled if cell[-1] in "])" and units.is_unit(units.split_header(cell)[1] or "?")]
+    return len(filled) > 1 and len(in_brackets) > 0 and not any(map(is_like_number, filled))
 
 
 def is_summary_row(cells: Sequence[str]) -> bool:

@@ -258,7 +258,8 @@ def _label_in_line(line: Line) -> Labels:
     values: dict[str, Any] = {}
     key, forms = _KEY_OF.get(plain(name)), (cells[1], " ".join(cells[1:3]), f"{cells[1]} {unit or ''}")
     if key in ("date", "operator", "specimen_number", "part_number"):
-        is_value = len(cells[1]) <= _LONGEST_VALUE and plain(cells[1]) not in _KEY_OF  # else a row of headers
+        is_header = plain(cells[1]) in _KEY_OF or units.split_header(cells[1])[1] is not None
+        is_value = len(cells[1]) <= _LONGEST_VALUE and not is_header
         values = {key: cells[1]} if is_value else {}
         return Labels(**values)
     if key == "direction":

@@ -46,6 +46,12 @@ def si_unit(role: str, motion: Motion) -> str:
     return str(getattr(motion, unit, unit))
 
 
+def is_test(roles: set[str]) -> bool:
+    """Return True if columns of these roles are those of a loop or sweep; a force may be read as its amplitude."""
+    is_loop = "displacement" in roles and not roles.isdisjoint(("force", "force_amplitude"))
+    return is_loop or (not roles.isdisjoint(_LEVELS[:2]) and any(set(pair) <= roles for pair in PAIRS))
+
+
 def stated_once(headers: Sequence[str], rows: Iterable[Sequence[str]], vocabulary: Vocabulary) -> frozenset[int]:
     """Indices of columns, such as an amplitude, whose cells are filled only where their value changes.
 

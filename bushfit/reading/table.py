@@ -19,7 +19,7 @@ from bushfit.geometry import TRANSLATION, Motion
 from bushfit.reading.headers import Column, Vocabulary
 from bushfit.reading.instruments import word_for_part
 from bushfit.reading.labelled import find_labels
-from bushfit.reading.layout import Layout, Line, is_comment, is_row, is_summary_row
+from bushfit.reading.layout import Layout, Line, begins_other_table, is_comment, is_row, is_summary_row
 from bushfit.reading.measurement import Floats
 from bushfit.reading.names import Labels, is_remark, labels_and_text_above
 from bushfit.reading.numerals import ALL_NUMERALS, Numerals, find_first_decimal, find_numerals, is_like_number
@@ -142,7 +142,8 @@ class Table:
         Yields:
             Line number, cells, and the reason why the row is not data (see `row_fault`); None for a row of data.
         """
-        level = dict[int, str | float]()
+        level, is_other_table = dict[int, str | float](), False
+        vocabulary = Vocabulary(of_motion(self.names, self.motion))
         try:
             for line in (block or self.source).lines(self.layout.lines_before_data):
                 if self.layout.numbered or not is_comment(line.content, self.layout.delimiter):
@@ -154,7 +155,11 @@ class Table:
                             if all(index in levels for index, cell in enumerate(cells) if cell != ""):
                                 continue
                             cells = [level.get(n, "") if cell == "" else cell for n, cell in enumerate(cells)]
-                        yield line.number, cells, row_fault(self, cells)
+                        if any(str(cell)[-1:] in ("]", ")") for cell in cells):
+                            texts = list(map(str, cells))
+                            is_same = self.layout.is_header(texts, vocabulary) or self.layout.is_repeated(texts)
+                            is_other_table = not is_same and (is_other_table or begins_other_table(texts))
+                        yield line.number, cells, "other" if is_other_table else row_fault(self, cells)
         except csv.Error as error:
             raise self.error("the table cannot be read", found=str(error)) from error
 
