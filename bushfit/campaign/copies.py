@@ -81,7 +81,7 @@ def without_copied_repeats(sweep: Sweep) -> Sweep:
     columns = {name: values[~is_copy] for name, values in columns.items() if isinstance(values, np.ndarray)}
     note = (
         f"{points} points of repeat{'s' * (len(repeats) > 1)} {_join_names([*map(str, repeats)])} are exact copies of "
-        "an earlier repeat and are left out; row numbers in messages skip the copies"
+        "an earlier repeat and are left out; row numbers in messages do not count the copies"
     )
     return _with_note(replace(sweep, **columns), note)
 

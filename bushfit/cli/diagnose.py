@@ -32,7 +32,7 @@ _COLOURS = {"consistent": "green", "named": "green", "unexplained": "red"}
     option(
         "--adopt EFFECT",
         "Add this effect, such as inertia, or correct this mistake in a test file, such as "
-        "peak_to_peak:sweep_axial. An unknown name prints all names.",
+        "peak_to_peak:sweep_axial. To list all names, state an unknown one.",
         multiple=True,
     ),
     option("--without EFFECT", "Exclude this effect or mistake from the search.", multiple=True),

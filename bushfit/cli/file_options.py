@@ -39,7 +39,7 @@ def metadata_options(kind: Literal["tests", "histories", "displacements"] = "tes
             tests; both add the argument `files`. "displacements" for one displacement history.
     """
     unit, header = ("axial=mm", "radial=Sy") if kind == "displacements" else ("force=kN", "force=Fz")
-    words = f'Header of a column, such as "{header}". An unknown ROLE prints all roles.'
+    words = f'Header of a column, such as "{header}". To list all roles, state an unknown one.'
     columns = (
         option("--unit units ROLE=UNIT", f'Unit of a column, such as "{unit}".', multiple=True),
         option("--column columns ROLE=HEADER", words, multiple=True),

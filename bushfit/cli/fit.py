@@ -80,7 +80,7 @@ def dynamic(
     direction_option("fit", "axial, and all specimens"),
     option(
         "--effect effects NAME",
-        "Add this effect to the model, such as inertia. An unknown name prints all names.",
+        "Add this effect to the model, such as inertia. To list all names, state an unknown one.",
         multiple=True,
     ),
     flag("--profile", "Compute additional 95 % intervals by profile likelihood; takes some seconds."),

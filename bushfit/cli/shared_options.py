@@ -135,7 +135,7 @@ def static_rate_option(subject: str) -> Parameter:
 
 
 def displacement_unit(text: str, per: str = "") -> str:
-    """SI unit (m, rad, 1) of a displacement such as "2 deg"; with `per` "/s" for a rate such as "10 mm/min"."""
+    """SI unit of a displacement: "m", "rad" ("2 deg") or "1" (strain); with `per` "/s", of a rate ("10 mm/min")."""
     suffix = re.sub(r"^[-+.\d\s]+(e[-+]?\d+)?\s*", "", text, flags=re.IGNORECASE)
     return next((unit for unit in ("rad", "1") if is_compatible(suffix, unit + per)), "m")
 

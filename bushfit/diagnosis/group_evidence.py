@@ -35,7 +35,7 @@ class GroupEvidence:
 
     @property
     def total(self) -> float:
-        """Natural log of the marginal likelihood, summed over compounds with and without a deviation."""
+        """Natural log of the tests' evidence, summed over rubber with and without a smooth deviation."""
         if self.with_compound is None:
             return self.log_evidence
         return float(np.logaddexp(self.log_evidence, self.with_compound.log_evidence))

@@ -92,7 +92,12 @@ class CompoundDeviation:
 
     @cached_property
     def modes(self) -> tuple[Array, Array]:
-        """Eigenvalues, (combinations, q), and eigenvectors, (combinations, q, q), of D^T S^-1 D for the q columns D."""
+        """Eigenvalues and eigenvectors of D^T S^-1 D for the q residual columns D, with the residuals' covariance S.
+
+        Returns:
+            Eigenvalues, (combinations, q), and eigenvectors, (combinations, q, q), for each combination of sizes of the
+            rig's errors.
+        """
         values, vectors = np.linalg.eigh(self.rows.inner(self.rows, np.arange(len(self.rig.combinations[0]))))
         return np.maximum(values, 0.0), vectors
 
@@ -169,7 +174,7 @@ class GroupSet:
 
     @cached_property
     def batches(self) -> list[Batch]:
-        """Blocks of columns that act together: those of a group are one block, or one block each."""
+        """Columns in blocks of equal width: a block for each group that acts together, and for every other column."""
         first, alike = 0, defaultdict[tuple[int, bytes], list[tuple[int, Array, int]]](list)
         units = dict[tuple[int, bytes], Array]()
         for number, group in enumerate(self.groups):

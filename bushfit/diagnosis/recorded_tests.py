@@ -111,7 +111,7 @@ class ExplanationColumns:
 
     @cached_property
     def sets(self) -> list[GroupSet]:
-        """Columns of all explanations."""
+        """Residual columns of all explanations, in sets small enough for the memory."""
         return GroupSet.split([e.group for e in self.tests.explanations if e.group], self.errors)
 
     @cached_property

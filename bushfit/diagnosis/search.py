@@ -151,7 +151,7 @@ class Search:
         return sorted(self._known.values(), key=lambda hypothesis: -hypothesis.log_posterior)
 
     def _is_sure(self) -> bool:
-        """True if the search can stop: one explanation, or none missing, is nearly certain and fits the tests."""
+        """True if the search can stop: one explanation, or that nothing is missing, is nearly certain and fits."""
         finding = decide_verdict(self._ordered_hypotheses(), self.settings.tolerance)
         if finding.verdict == "consistent":
             return finding.nothing >= NAMED and self.root.linear.p_value() >= DOES_NOT_FIT

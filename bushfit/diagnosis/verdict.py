@@ -169,10 +169,13 @@ def _verdict_on_parts(likely: Sequence[Composition], nothing: float, leads: Sequ
 
 
 def _leads(pairs: Sequence[tuple[Hypothesis, float]]) -> tuple[str, ...]:
-    """Effects of the most probable hypothesis whose total probability, over all hypotheses with them, is high.
+    """List the effects of the most probable hypothesis that are probable in all hypotheses together.
 
     Args:
         pairs: hypotheses and their posterior probabilities, the most probable first.
+
+    Returns:
+        Names of effects in hypotheses with at least `LEAST_NAMED_SHARE` of the total probability.
     """
     share: dict[str, float] = defaultdict(float)
     for hypothesis, weight in pairs:

@@ -48,7 +48,7 @@ ForceBelow = Callable[[History], Array]
 
 
 class StiffnessBelow(Protocol):
-    """Steady response without a layer and those around it: an argument of `Layer.stiffness`."""
+    """Steady response inside a layer, without this layer and those around it; argument of `Layer.stiffness`."""
 
     def __call__(self, omega: Array, amplitude: Array, /) -> Array:
         """Complex dynamic stiffness [N/m or N m/rad] at omega [rad/s] and amplitude [m or rad]."""
@@ -318,7 +318,7 @@ class Layer(Effect):
     def acts_at(self, place: Place) -> bool:
         """Return True if the layer acts in tests of this direction or specimen.
 
-        Tests of a modulus have neither rig nor sleeve: only layers that correct a stiffness formula act there.
+        Tests of a modulus have neither rig nor sleeve: only a layer with `corrects`, a corrected formula, acts there.
         """
         acts = self.corrects is not None if place.motion is STRAINING else self.turns or not place.is_rotation
         return acts and super().acts_at(place)

@@ -179,7 +179,11 @@ class History:
         return replace(self, value=value, solved={} if solved is None else solved)
 
     def faster(self, factor: Any) -> History:
-        """Create a history of the same motion at a higher speed, multiplied by a factor: a number, or (..., 1)."""
+        """Create the history of the same motion run `factor` times as fast: same displacements, shorter time steps.
+
+        Args:
+            factor: a number, or (..., 1).
+        """
         return replace(self, step=self.step / factor, frequency=self.frequency * factor, solved={})
 
     def as_driver(self) -> History:

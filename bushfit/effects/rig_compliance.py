@@ -183,7 +183,12 @@ class _AndersonMixing:
         self._before: tuple[Array, Array] | None = None
 
     def step(self, estimate: Array, change: Array) -> Array:
-        """Next change of the force, from the force and the proposed change of this iteration, (..., n) [N] each."""
+        """Change of the force to apply next, improved by the previous iterations.
+
+        Args:
+            estimate: force of this iteration [N], (..., n).
+            change: change that the fixed-point iteration proposes for it [N], (..., n).
+        """
         before, self._before = self._before, (estimate, change)
         if before is None:
             return change

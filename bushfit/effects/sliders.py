@@ -51,7 +51,7 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
     strain = np.maximum(strain, np.finfo(float).tiny)
 
     def slipping(end: Array) -> Array:
-        """Integral of (A + iB) strain/s over ln e_y up to the slip strain `end`, for sliders that slip."""
+        """Integral of (A + iB) e0/s over ln e_y up to the slip strain `end`, for the sliders that slip (`end` < e0)."""
         r = np.minimum(end / strain, 1.0)
         t = np.arccos(1.0 - 2.0 * r)
         turned = 4.0 * (t + np.sin(t)) - (t - 0.5 * np.sin(2.0 * t)) / r

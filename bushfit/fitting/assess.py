@@ -148,7 +148,7 @@ def _changes_by_noise(
 
 
 def _inverse(system: Array) -> Array:
-    """Inverse of a square matrix; its singular values are limited to `_LARGEST_ERROR`, for singular matrices."""
+    """Inverse of a square matrix, (k, k), that may be singular: its singular values are at most `_LARGEST_ERROR`."""
     left_vectors, values, right_vectors = np.linalg.svd(system)
     return (right_vectors.T / np.maximum(values, 1.0 / _LARGEST_ERROR)) @ left_vectors.T
 

@@ -309,7 +309,7 @@ class MeasuredLoop(MeasuredBase):
 
     @cached_property
     def _fundamental(self) -> Array:
-        """Orthonormal basis of the whitened rows of a first harmonic, (n, 2)."""
+        """Orthonormal basis of the changes of the n whitened rows by a first harmonic of any size and phase, (n, 2)."""
         waves = self.row_noise.whiten(basis(self.phase, 1).T[1:] * self._per_noise)
         return np.linalg.qr((waves * self._usable_rows).T)[0]
 
@@ -344,7 +344,7 @@ class MeasuredLoop(MeasuredBase):
 
     @cached_property
     def unit_model_error(self) -> SharedErrors:
-        """Model error of 100 % of half the force range, as errors that the rows share.
+        """Model error with a standard deviation of half the force range, as independent errors that change all rows.
 
         The errors are the cosine and sine of each harmonic and an offset; for a loop from rest, also a deviation of the
         first cycle and a drift.

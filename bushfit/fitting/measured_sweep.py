@@ -223,7 +223,7 @@ class MeasuredSweep(MeasuredBase):
 
     @cached_property
     def unit_model_error(self) -> SharedErrors:
-        """Error of the model of 100 % of |K|, in phase and in quadrature; repeats of an operating point share it."""
+        """Model error of 100 % of |K| (standard deviation) in phase and in quadrature; repeats of a point share it."""
         points = np.unique(self.frequency + 1j * self.amplitude, return_inverse=True)[1]
         return SharedErrors.of_groups(points, self.covariance.per_scatter, (1.0, 1.0))
 

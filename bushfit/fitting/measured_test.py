@@ -84,7 +84,7 @@ class MeasuredBase(ABC):
     @property
     @abstractmethod
     def unit_model_error(self) -> SharedErrors:
-        """Error of the model of 100 %, as independent errors that each change several residuals."""
+        """Model error with a standard deviation of 100 %, as independent errors that each change several residuals."""
 
     def with_model_error(self, size: float) -> Self:
         """Return the test with a model error of this size, relative to |K| or half a loop's force range."""

@@ -53,7 +53,7 @@ def outlier_limit(rows: int, parts: int, freedom: float) -> float:
 
 
 def are_outliers(residual: Array, recorded: Array, limit: float) -> Array:
-    """Mask of the rows that are far from a curve and also far from their neighbours, or stuck.
+    """Mask of the rows that are far from a curve, and are also far from their neighbours or repeat a stuck value.
 
     Args:
         residual: distance of each row from the curve, (n,).

@@ -66,7 +66,7 @@ def with_gain_errors(loops: Sequence[MeasuredLoop], rig: RigSettings) -> list[Me
 
 
 def with_gain_weighting(data_sets: Iterable[MeasuredTest], *, weigh: bool) -> list[MeasuredTest]:
-    """Return tests whose fit weights include the gain errors of loops (`weigh`), or whose uncertainty alone does."""
+    """Copy tests, and set if gain errors of loops affect the weights of the fit (`weigh`) or only the uncertainty."""
     return [replace(test, gain_weighs=weigh) if isinstance(test, MeasuredLoop) else test for test in data_sets]
 
 

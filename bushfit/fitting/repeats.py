@@ -64,7 +64,7 @@ class LineNoise:
 
     @property
     def variance(self) -> Array:
-        """Variances of gain and phase from point to point, (2,)."""
+        """Variances from point to point of the relative deviations in |K| and of those in phase [rad^2], (2,)."""
         return np.asarray(np.square(self.scatter).sum(axis=0) / max(self.freedom, 1))
 
 

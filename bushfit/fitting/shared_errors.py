@@ -75,7 +75,7 @@ class SharedErrors:
         return float(np.sum(np.log1p(np.square(self.deviations))))
 
     def whiten(self, rows: Array) -> Array:
-        """Whiten residuals or derivatives in units of noise, (..., n), by the shared errors; same shape."""
+        """Multiply residuals or derivatives in units of noise, (..., n), by S^(-1/2), to remove correlation."""
         if not self.deviations.any():
             return rows
         return rows - self.multiply(rows, 1.0 - 1.0 / np.hypot(1.0, self.deviations))

@@ -46,7 +46,7 @@ class Whitening:
         return (np.sqrt(self.weights) / self.random).ravel()
 
     def whiten(self, rows: Array) -> Array:
-        """Whiten deviations in units of their scatter, (..., 2 n), by the errors that runs and lines share."""
+        """Remove the correlation by errors that points share from deviations in units of scatter, (..., 2 n)."""
         return self._line_errors.whiten(self.runs.whiten(rows))
 
     def scaled(self, deviation: Array, *, shared: bool = True) -> Array:

@@ -275,8 +275,8 @@ def default_places(bushing: Bushing | None, specimens: Sequence[Specimen]) -> li
 def shared_labels(places: Iterable[Place]) -> list[str]:
     """List the names of directions, specimens and bodies to which a missing effect may be restricted.
 
-    A name that the tests cannot distinguish from another is left out: a bushing that was tested in one direction only,
-    and the first of two bodies, because an effect on it equals the opposite effect on the second.
+    A name is left out if the tests cannot distinguish it from others: a bushing that was tested in one direction only,
+    and the first of two bodies, because stiffening of the first looks like softening of the second.
 
     Args:
         places: tested directions and specimens.

@@ -37,7 +37,7 @@ class Correction(NamedTuple):
         stiffness: radial stiffness over the stiffness of Eqs. 11 and 12.
         strain: equivalent strain over the strain of Eq. 8. At this strain the friction branch equals its average over
             the uneven strain field, for strain amplitudes from 0.3 to 3 times that of half the friction (eps_half).
-        softening: relative increase of the radial compliance, divided by shear modulus over bulk modulus.
+        softening: relative increase of the radial compliance per ratio of shear modulus to bulk modulus.
     """
 
     stiffness: float

@@ -17,7 +17,7 @@ FACTOR_SPREAD = 0.03
 
 
 def factor_spread(result: Result) -> float | None:
-    """Relative standard deviation of the stiffness of bushings from the formula, by the priors of their factors.
+    """Relative standard deviation of measured from computed bushing stiffness, by the priors of stiffness factors.
 
     Returns:
         Root mean square distance from 1 of the stiffness factors that the campaign's priors expect [1]; None if no

@@ -125,7 +125,7 @@ class PlannedQuantity:
         return self.meets_target(error_covariance) or (not self.meets_target(limit) and nearly)
 
     def weight(self, limit: Array) -> Array:
-        """Compute the weight matrix of the search criterion for the target.
+        """Compute the matrix W of the search's objective trace(W covariance) for this target.
 
         Args:
             limit: covariance of the parameters with unlimited tests, (k, k).

@@ -149,7 +149,7 @@ def unfitted_warnings(result: Result, direction: Place) -> Iterator[str]:
         is_radial = direction.axis is Direction.RADIAL and corrected.isdisjoint(direction.labels)
         if is_radial and bushing and bushing.shape == "paper":
             error = _radial_error(bushing)
-            yield f"{direction}: fitted with the paper's formula, {error}. The parameters carry that error"
+            yield f"{direction}: fitted with the paper's formula, {error}. The parameters contain this error"
             yield from _compressible(result, bushing, direction)
         return
     of_bushing = direction.axis is Direction.AXIAL and Direction.AXIAL not in axes and not axes.isdisjoint(Direction)

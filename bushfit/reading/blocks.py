@@ -146,7 +146,7 @@ def exchange_rows(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> 
     lines = [Line(line.number, list(map(str, cells_of(line, layout.delimiter)))) for line in source.head()]
 
     def has_name(line: Line) -> bool | None:
-        """True for a row with numbers behind its first cell."""
+        """True for a row with a name, then numbers only; None for any other line."""
         return (len(line.content) > 3 and all(map(is_like_number, map(str, line.content[1:])))) or None
 
     content, is_exchanged = list[Sequence[str | float]](), False

@@ -202,7 +202,7 @@ def read_condition(table: Table, role: str, motion: Motion) -> Condition | None:
 
 
 def _numbers(table: Table, column: Column) -> Floats:
-    """Numbers in a column, (n,), in the unit of the file; an empty cell has the number above, NaN is no number."""
+    """Numbers in a column, (n,), in the unit of the file; an empty cell repeats the number above, NaN for a text."""
     blocks = [table.parse(block, table.needed | {column.index}) for block in table.blocks()]
     if blocks and all(blocks):
         return np.concatenate([block[column.index] for block in blocks if block])

@@ -72,8 +72,8 @@ def read_loop(
         copies = np.flatnonzero(stuck) + 1
         if copies.size and all(np.array_equal(x[copies], x[copies - 1]) for x in values.values()):
             values = {role: np.delete(numbers, copies) for role, numbers in values.items()}
-            repeated = f"{copies.size} rows that equal the rows" if copies.size > 1 else "1 row that equals the row"
-            notes += (f"left out: {repeated} before, including the time",)
+            rows = f"{copies.size} row{'s' * (copies.size > 1)}"
+            notes += (f"left out: {rows} equal to the row before, with the same time",)
             displacement, force = values["displacement"], values["force"]
         time, more = increasing_time(table, wanted["time"], values["time"])
         notes = (*notes, *more)

@@ -53,13 +53,16 @@ def is_test(roles: set[str]) -> bool:
 
 
 def stated_once(headers: Sequence[str], rows: Iterable[Sequence[str]], vocabulary: Vocabulary) -> frozenset[int]:
-    """Indices of columns, such as an amplitude, whose cells are filled only where their value changes.
+    """Find the columns, such as an amplitude, whose cells are filled only where their value changes.
 
     Args:
         headers: header cells of the table.
         rows: cells of its first rows, as texts; rows without a stiffness or loss, such as those of waveforms, are
             ignored.
         vocabulary: known column names.
+
+    Returns:
+        Indices of the columns.
     """
     roles = [heading.role if header and (heading := vocabulary.heading(header)) else "" for header in headers]
     columns = [index for index, role in enumerate(roles) if role in _LEVELS]

@@ -130,7 +130,7 @@ def stretches(changes: NDArray[np.bool_], fewest: int = 1) -> list[slice]:
 
 
 def resumes_in_phase(gap: float, *, step: float = 1.0) -> bool:
-    """True if a sine continues in phase after a gap [cycles]: at most three cycles, and a multiple of `step`."""
+    """True if a gap [cycles] is at most three cycles long and a multiple of `step`, so that a sine resumes in phase."""
     return gap < _LONGEST_INTERRUPTION and abs(gap - step * round(gap / step)) < _SAME_PHASE
 
 

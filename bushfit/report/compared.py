@@ -110,7 +110,7 @@ class PlaceDifferences:
         stiffness = stiffness.removeprefix("reference ")
         if [*columns] != contrast_headers(amplitude, stiffness) or len({0, *map(len, columns.values())}) != 2:
             raise ModelError(
-                "the columns do not fit together",
+                "columns are missing, empty or of unequal length",
                 place=f"pairs, {label}, places, {place}",
                 expected="the columns that bushfit compare writes, equally long",
             )

@@ -81,7 +81,11 @@ def parameter_rows(result: Result) -> Iterator[ParameterRow]:
 
 
 def effect_sizes(effect: EffectEntry) -> list[tuple[str, str, str]]:
-    """Format the parameters of an effect that a diagnosis named: name, value with unit, and 95 % interval of each."""
+    """Format the parameters of an effect that a diagnosis named.
+
+    Returns:
+        Name, value with unit, and 95 % interval of each parameter.
+    """
     rows = []
     for name, size in effect["parameters"].items():
         unit, factor = display_unit(size["unit"], 1.0, size["value"])
