@@ -51,13 +51,30 @@ def label_columns(
 
 
 def is_of_block(line: Line, columns: Sequence[str], vocabulary: Vocabulary) -> bool:
-    """Return True if a line above the first block states a quantity, or one of these columns, of this block alone."""
+    """True if a line above the first block states an operating point, or one of some columns, for this block alone.
+
+    Args:
+        line: line above the first block.
+        columns: headers of the columns that are made from the lines above the blocks.
+        vocabulary: known column names.
+
+    Returns:
+        True or False; a line for all blocks is False.
+    """
     stated = stated_above([line], vocabulary)
     return any(header in columns or _role(header) in ("amplitude", "frequency") for header in stated)
 
 
 def stated_above(lines: Sequence[Line], vocabulary: Vocabulary) -> dict[str, str | float]:
-    """Values that the lines above a block state, the last of which is its title, by header of a column."""
+    """Read the values that the lines above a block state.
+
+    Args:
+        lines: lines above the block, of which the last is its title.
+        vocabulary: known column names.
+
+    Returns:
+        Number or text by header of the column that would contain it, such as "amplitude [mm]".
+    """
     labels = labels_and_text_above(lines) | labels_in_names(lines[-1].text if lines else "")
     stated: dict[str, str | float] = {}
     for si in ("m", "rad", "1", "Hz"):
