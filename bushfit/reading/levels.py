@@ -30,7 +30,7 @@ _FEWEST_POINTS = 3
 
 
 @dataclass(frozen=True)
-class Condition:
+class ConditionColumn:
     """Temperature or preload of each row of a loop or sweep.
 
     Args:
@@ -160,7 +160,7 @@ class Condition:
         )
 
 
-def read_condition(table: Table, role: str, motion: Motion) -> Condition | None:
+def read_condition(table: Table, role: str, motion: Motion) -> ConditionColumn | None:
     """Read the temperature or preload of each row of a loop or sweep.
 
     Args:
@@ -196,9 +196,9 @@ def read_condition(table: Table, role: str, motion: Motion) -> Condition | None:
     if role == "temperature" and not kelvin:
         si_column(table, role, Direction.AXIAL)  # raises the error, whatever the direction
     if kelvin:
-        return Condition(table, column, "degC", kelvin[0] * values + kelvin[1] - CELSIUS, SAME_TEMPERATURE)
+        return ConditionColumn(table, column, "degC", kelvin[0] * values + kelvin[1] - CELSIUS, SAME_TEMPERATURE)
     step = _PRELOAD_STEP * float(np.abs(values).max(initial=0.0))
-    return Condition(table, column, column.unit or "", values, step)
+    return ConditionColumn(table, column, column.unit or "", values, step)
 
 
 def _numbers(table: Table, column: Column) -> Floats:
