@@ -164,8 +164,8 @@ class FittedTests:
         """Part of the residuals that neither the parameters nor errors of the rig explain.
 
         Returns:
-            Orthonormal basis of the changes of the d components that parameters and rig errors can produce, (e, d), and
-            components of the residuals orthogonal to this basis, (d,).
+            Orthonormal basis of the changes of the d components (see `project`) by parameters and rig errors, (e, d),
+            and components of the residuals orthogonal to this basis, (d,).
         """
         rows, residual = self.solution.jacobian, self.solution.residual
         rig_errors = self.rig_errors or [np.empty((0, test.size)) for test in self.data_sets]

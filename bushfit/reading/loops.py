@@ -72,8 +72,8 @@ def read_loop(
         copies = np.flatnonzero(stuck) + 1
         if copies.size and all(np.array_equal(x[copies], x[copies - 1]) for x in values.values()):
             values = {role: np.delete(numbers, copies) for role, numbers in values.items()}
-            rows = f"{copies.size} row{'s' * (copies.size > 1)}"
-            notes += (f"left out: {rows} equal to the row before, with the same time",)
+            left_out = f"{copies.size} row{'s' * (copies.size > 1)} equal to the row before"
+            notes += (f"left out: {left_out}, with the same time",)
             displacement, force = values["displacement"], values["force"]
         time, more = increasing_time(table, wanted["time"], values["time"])
         notes = (*notes, *more)
