@@ -26,6 +26,8 @@ _MOST_LISTED = 4
 _FEW_SIZES, _COARSE = 0.4, 0.01
 #: Digits of ln|K| that tell magnitudes apart.
 _DIGITS = 9
+#: Conditions of the rubber that repeats of a point share: a model that depends on no others has one response for them.
+_SAME_IN_REPEATS = {"temperature", "preload"}
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -158,12 +160,28 @@ class MeasuredSweep(MeasuredBase):
         """Zero-to-peak amplitude that the rig reached at each point [m or rad], (n,), where models are evaluated."""
         return self.test.amplitude_reached[self.order]
 
+    @cached_property
+    def _distinct_points(self) -> tuple[Array, RubberConditions, Array]:
+        """Operating points without repeats.
+
+        Returns:
+            Index of one point for each distinct frequency, amplitude and temperature, (m,); its conditions; and, for
+            each point of the sweep, the number of its equal among these, (n,).
+        """
+        temperature = 0.0 if self.conditions.temperature is None else self.conditions.temperature
+        keys = np.stack(np.broadcast_arrays(self.frequency, self.reached, temperature))
+        _, points, repeats = np.unique(keys, axis=1, return_index=True, return_inverse=True)
+        return points, self.conditions.select(points), repeats.ravel()
+
     def response(self, model: Model, values: Values | None = None) -> Array:
         """Stiffness of a model at the points of the sweep, (..., n) [N/m or N m/rad]; see `MeasuredBase`."""
         if values is None and (stiffness := self.recall("response", model)) is not None:
             return stiffness
-        stack = model.stack(self.direction, "sweep", self.conditions, values)
-        stiffness = stack(2.0 * np.pi * self.frequency, self.reached)
+        every = np.arange(self.order.size)
+        repeated = model.depends_on <= _SAME_IN_REPEATS
+        points, conditions, repeats = self._distinct_points if repeated else (every, self.conditions, every)
+        stack = model.stack(self.direction, "sweep", conditions, values)
+        stiffness = stack(2.0 * np.pi * self.frequency[points], self.reached[points])[..., repeats]
         return stiffness if values is not None else self.keep("response", model, stiffness)
 
     def residual_of(self, response: Array) -> Array:
