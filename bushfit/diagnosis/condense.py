@@ -93,11 +93,11 @@ def _select_loops(loops: Sequence[MeasuredLoop]) -> Sequence[MeasuredLoop]:
     times_before = np.tril(repeats_of(loops), -1).sum(axis=1)
     distinct = np.flatnonzero(times_before == 0)
     points = np.log([(*loop.frequency, *loop.amplitude) for loop in loops])
-    apart = 1e3 * np.unique(directions, return_inverse=True)[1]
-    spread = distinct[spread_nodes(np.column_stack((points, apart))[distinct], distinct.size)]
+    direction_axis = 1e3 * np.unique(directions, return_inverse=True)[1]
+    spread = distinct[spread_nodes(np.column_stack((points, direction_axis))[distinct], distinct.size)]
     chosen = list[int]()
     for n in dict.fromkeys([*spread.tolist(), *np.argsort(times_before, kind="stable").tolist()]):
-        is_first = directions[n] not in {directions[other] for other in chosen}
+        is_first = directions[n] not in {directions[m] for m in chosen}
         if is_first or sizes[[*chosen, n]].sum() <= _MOST_ROWS:
             chosen.append(n)
     return [loops[n] for n in sorted(chosen)]

@@ -77,10 +77,10 @@ class LineMisfit:
     @property
     def label(self) -> str:
         """Text with the line's constant quantity and its preload, such as "0.1 mm"; else the name of the test."""
-        held = f"{self.frequency[0]:.4g} Hz" if self.stepped else self.name
+        constant = f"{self.frequency[0]:.4g} Hz" if self.stepped else self.name
         if self.stepped == "frequency":
-            held = shown_amplitude(self.direction, float(self.amplitude[0]))
-        return add_preload(held, self.preload, self.direction)
+            constant = shown_amplitude(self.direction, float(self.amplitude[0]))
+        return add_preload(constant, self.preload, self.direction)
 
     @cached_property
     def smooth(self) -> Array:
@@ -105,8 +105,8 @@ def line_misfits(sweep: MeasuredSweep, model: Model) -> Iterator[LineMisfit]:
         variance = np.square(sweep.noise.random[sweep.name, float(held_value)]) + np.square(sweep.noise.shared)
         noise = np.sqrt(variance / np.median(counts) + np.square(sweep.noise.level))
         frequency, amplitude = (values[mask][first] for values in (sweep.frequency, sweep.amplitude))
-        held = sweep.name, sweep.direction, sweep.test.preload, sweep.test.stepped
-        yield LineMisfit(*held, frequency, amplitude, mean, noise)
+        test = sweep.name, sweep.direction, sweep.test.preload, sweep.test.stepped
+        yield LineMisfit(*test, frequency, amplitude, mean, noise)
 
 
 def find_regions(fit: FitResult) -> tuple[MisfitRegion, ...]:

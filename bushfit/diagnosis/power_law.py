@@ -86,8 +86,7 @@ class PowerLaw:
 
     Args:
         measure: unit of A with the highest evidence: stiffness, modulus or share of the model's stiffness.
-        alternatives: other units that fit the tests nearly as well; the intervals average over all units by
-            probability.
+        alternatives: other units that fit nearly as well; the intervals average over all units by probability.
         phase_deg: phase phi [deg], with the ends of its interval.
         frequency_power: power p of frequency, with the ends of its interval.
         amplitude_power: power q of amplitude, with the ends of its interval.
@@ -198,11 +197,7 @@ class Term:
         return shapes / np.abs(shapes * self.unit(model) / self.stiffness(model)).max(axis=-1)[:, None]
 
     def residual(self, value: Array, model: Model) -> Array:
-        """Whitened residuals of a model to which the stiffness `value`, (p,) in the unit `measure`, is added.
-
-        Returns:
-            Residuals of all tests and priors, (n,).
-        """
+        """Return whitened residuals, (n,), of tests and priors if `value`, (p,), is added to a model's stiffness."""
         residuals, added = self.fit.problem.residual(model), value * self.unit(model)
         for test, points in self.tests:
             rows = self.fit.residual_rows[test]
@@ -292,8 +287,7 @@ class _Grid:
     Args:
         measure: unit of the added stiffness.
         linear: linearised model without the added stiffness.
-        groups: changes of the residuals for each pair of powers, by a unit of added stiffness in phase and one in
-            quadrature.
+        groups: changes of the residuals by unit stiffness in phase and in quadrature, for each pair of powers.
         cases: indices of the noise cases (assumed sizes of the rig's errors) to average over.
         powers: powers of frequency and amplitude, (g, 2).
         step: spacing of the grid along each axis, (2,); 0 along an axis on which the tests do not differ.

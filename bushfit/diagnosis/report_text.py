@@ -94,11 +94,7 @@ class DiagnosisWriter:
         return self.finding.reported[0] if self.finding.reported else None
 
     def diagnosis(self) -> Diagnosis:
-        """Build the diagnosis with all texts.
-
-        Returns:
-            Verdict, effects, regions, hold-out, next test and the model to use.
-        """
+        """Return the diagnosis with all texts: verdict, effects, regions, hold-out, next test, model to use."""
         first, verdict = self.first, self.finding.verdict
         if first is None:
             return self._build(Closing(self._with_free_gains(self.search.base)), _NOTHING)
@@ -279,10 +275,9 @@ class DiagnosisWriter:
         return [c for c in self.finding.reported if c.probability > 1.0 - NAMED and c.causes]
 
     def _deciding_advice(self, leader: Composition) -> str:
-        """Advice on the test that separates the possible causes; an effect with a twin may be in the rig as well.
+        """Advice on the test that separates the possible causes, of which `leader` is the most probable.
 
-        Args:
-            leader: most probable explanation with causes.
+        An effect with a twin may be in the rig as well.
         """
         if (claim := leader.best.claim) and leader is self.first:
             return f"check the records of the tests; {'; '.join(claim.corrections)}"
@@ -298,14 +293,11 @@ class DiagnosisWriter:
         return advice or (get_effect(leader.names[0]).confirmed_by if leader.names else "")
 
     def _record_entries(self, composition: Composition, alternatives: tuple[str, ...] = ()) -> list[NamedCause]:
-        """List the report's entries on the recording mistake of an explanation, one for each affected test.
+        """List the entries on the recording mistake of an explanation, one per affected test; none without a mistake.
 
         Args:
             composition: the explanation.
             alternatives: names of explanations that the tests cannot distinguish from this one.
-
-        Returns:
-            Entries with the sentence and the correction; none if the explanation has no mistake.
         """
         if (claim := composition.best.claim) is None:
             return []

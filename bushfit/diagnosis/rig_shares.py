@@ -64,14 +64,14 @@ def with_alternatives(result: Result, hypotheses: Sequence[Hypothesis], base: Fi
             alternatives.append(Alternative(fit.model, share, misfit_covariance(fit)))
             continue
         names = [qualified_name(effect, p) for effect in map(get_effect, sorted(effects)) for p in effect.parameters]
-        amounts, known = mean_parameters(members[effects], names)
+        amounts, posterior = mean_parameters(members[effects], names)
         model = result.model.without(*current)
         for name in sorted(effects):
             model = model.with_effect(name, amounts)
         corrected = _with_stiffness_of(result.model, model, places)
-        kept = result.covariance.restricted([name for name in model.values if name not in names])
-        matrix = block_diag(kept.matrix, known.matrix)
-        alternatives.append(Alternative(corrected, share, Covariance((*kept.names, *known.names), matrix)))
+        parameters = result.covariance.restricted([name for name in model.values if name not in names])
+        matrix = block_diag(parameters.matrix, posterior.matrix)
+        alternatives.append(Alternative(corrected, share, Covariance((*parameters.names, *posterior.names), matrix)))
     return replace(result, alternatives=tuple(alternatives))
 
 

@@ -119,11 +119,11 @@ def undetermined_parameters(
             effect = effect_name_of(name)
             remark = f": these tests do not show {effect}" * (effect in unseen)
             lines.append(f"{name} does not differ from {neutral[name]:g}{remark}")
-        kept = [name not in zero and effect_name_of(name) not in unseen for name in names]
-        names = [name for name, keep in zip(names, kept, strict=True) if keep]
+        is_shown = [name not in zero and effect_name_of(name) not in unseen for name in names]
+        names = [name for name, keep in zip(names, is_shown, strict=True) if keep]
         if not names:
             return lines
-        directions = _error_directions(slopes[kept])
+        directions = _error_directions(slopes[is_shown])
         groups = _groups(names, directions)
     if not groups:
         return []
