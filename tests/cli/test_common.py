@@ -216,7 +216,7 @@ def test_json_is_utf8_in_any_code_page_and_no_text_steers_the_terminal(folder):
     said = "\x1b[2J\x9b2J\u202ecleared"
     model = MODEL | {"warnings": [said], "bushing": MODEL["bushing"] | {"name": "衬套"}}
     (folder / "model.json").write_text(json.dumps(model), encoding="utf-8")
-    settings = {**os.environ, "PYTHONIOENCODING": "cp1252"}
+    settings = {**os.environ, "PYTHONIOENCODING": "cp1252", "COLUMNS": "auto"}
     command = [*BUSHFIT, "simulate", "model.json", "-o", "x", "--json"]
     done = subprocess.run(command, capture_output=True, env=settings, check=False)
     assert done.returncode == 0, done.stderr

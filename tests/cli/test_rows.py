@@ -61,6 +61,8 @@ def test_directions_are_tests_of_their_own(typed, points, tmp_path, language, en
     assert named == [("axial", "both axial"), ("radial", "both radial")]
     for sweep in sweeps:
         assert np.abs(sweep.stiffness) == pytest.approx([1e3 * row[2] for row in points[str(sweep.direction)]])
+    told = typed("inspect", f"both.{ending}", "-o", "z", "--no-plots").stderr
+    assert all(f"both.{ending}, direction {way}: a sweep" in told for way in points)
     one = typed("init", f"both.{ending}", *GEOMETRY, "-o", "y", "--direction", "axial")
     assert "rows of radial are not used: other values were stated" in one.stderr
     assert [str(sweep.direction) for sweep in load_campaign(tmp_path / "y/campaign.toml").sweeps] == ["axial"]

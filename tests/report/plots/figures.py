@@ -13,7 +13,6 @@ from matplotlib.transforms import Bbox
 from bushfit.effects.contract import Array
 from bushfit.fitting.preparation import MeasuredLoop, MeasuredSweep, MeasuredTest
 from bushfit.geometry import Direction
-from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.prediction.stiffness import predict
@@ -29,11 +28,6 @@ AMPLITUDES = np.array([1e-4, 2e-4, 5e-4])
 TORSION = np.radians([0.5, 1.0, 2.0])
 #: A picture that is higher does not fit on three pages of A4 [inch].
 HIGHEST = 33.0
-
-
-def fitted(model: Model) -> Result:
-    names = tuple(model.values)
-    return Result(model, names, Covariance(names, np.diag([(0.02 * model.values[name]) ** 2 for name in names])))
 
 
 def sweeps(model: Model, *data_sets: MeasuredSweep) -> Figure:
@@ -84,19 +78,9 @@ def points(axes: Axes) -> list[Any]:
     return [line for line in axes.get_lines() if line.get_linestyle() == "None"]
 
 
-def labels(figure: Figure) -> list[str]:
-    names = [name for axes in figure.axes for name in (axes.get_xlabel(), axes.get_ylabel()) if name]
-    return [" ".join(name.split()) for name in names]
-
-
 def legend(axes: Axes) -> list[str]:
     box = axes.get_legend()
     return [] if box is None else [text.get_text() for text in box.get_texts()]
-
-
-def note(figure: Figure) -> str:
-    """What is explained below the panels."""
-    return " ".join(figure.get_supxlabel().split())
 
 
 @fixed_settings()

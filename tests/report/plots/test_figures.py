@@ -6,14 +6,10 @@ import numpy as np
 import pandas as pd
 import pytest
 from figures import (
-    TORSION,
-    fitted,
     gap,
-    labels,
     legend,
     lines,
     loops,
-    note,
     points,
     prediction,
     sweeps,
@@ -44,39 +40,6 @@ def test_differences_are_measured_minus_model_everywhere(paper_model, stiff, swe
     phase = loops(stiff, looped(paper_model, 1e-3)).axes[1]
     (means,) = lines(phase)
     assert means.get_ydata()[0] < 0.0 < means.get_ydata()[len(means.get_ydata()) // 2], "at the upper turn, the lower"
-
-
-def test_loops_show_model_and_residuals(paper_model, looped):
-    data_sets = [looped(paper_model, 1e-3), looped(paper_model, 5e-4, run_in=3)]
-    figure = whole(loops(paper_model, *data_sets))
-    over_phase = ["phase after the upper turn [deg]", "force residual / noise"]
-    assert labels(figure) == ["displacement [mm]", "axial force [N]", *over_phase]
-    assert [len(lines(axes)) for axes in figure.axes] == [2, 2]
-    assert legend(figure.axes[1]) == ["1 mm, 0.1 Hz", "0.5 mm, 0.1 Hz", "model"]
-    assert max(np.nanmax(line.get_ydata()) for line in lines(figure.axes[0])) == pytest.approx(458.0, rel=0.02)
-    long = loops(paper_model, looped(paper_model, 1e-3, cycles=40))
-    assert max(len(line.get_xdata()) for axes in long.axes for line in (*lines(axes), *points(axes))) <= 240
-    (model_line,) = lines(long.axes[0])
-    step = np.hypot(np.diff(model_line.get_xdata()), np.diff(model_line.get_ydata()) / 458.0)
-    assert np.nanmax(step) < 0.2, "a stroke across the cycles that are left out"
-
-
-def test_prediction_over_frequency_and_amplitude_and_means_of_repeats(paper_model, swept):
-    result = fitted(paper_model)
-    figure = prediction(result, Direction.AXIAL, swept(paper_model), note="A further sentence.")
-    shown = ("axial stiffness |K| [N/mm]", "axial loss factor [-]")
-    assert labels(figure) == [each for x in ("frequency [Hz]", "amplitude [mm]") for y in shown for each in (x, y)]
-    assert [len(lines(axes)) for axes in figure.axes] == [3, 3, 4, 4]
-    assert legend(figure.axes[1]) == ["0.1 mm", "0.2 mm", "0.5 mm"]
-    assert legend(figure.axes[3]) == ["155 Hz", "105 Hz", "55 Hz", "5 Hz"]
-    for words in ("95 % band", "mean of the repeats", "A further sentence."):
-        assert words in note(figure)
-    line = lines(figure.axes[0])[0]
-    spot = np.flatnonzero(np.isclose(line.get_xdata(), 5.0))[0]
-    assert line.get_ydata()[spot] == pytest.approx(591.0, rel=1e-3)
-    both = (swept(paper_model), swept(paper_model, Direction.RADIAL))
-    assert len(points(prediction(result, Direction.AXIAL, *both, amplitudes=np.array([2e-4, 3e-4])).axes[0])) == 1
-    assert "Points" not in note(prediction(result, Direction.TORSION, *both, amplitudes=TORSION))
 
 
 @pytest.mark.parametrize("count", some([8, 40], {40}))
