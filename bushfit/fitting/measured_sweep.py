@@ -165,8 +165,8 @@ class MeasuredSweep(MeasuredBase):
         """Operating points without repeats.
 
         Returns:
-            Index of one point for each distinct frequency, amplitude and temperature, (m,); its conditions; and, for
-            each point of the sweep, the number of its equal among these, (n,).
+            Index of one point for each distinct frequency, amplitude and temperature, (m,); their conditions; and, for
+            each point of the sweep, the position of its equal among these, (n,).
         """
         temperature = 0.0 if self.conditions.temperature is None else self.conditions.temperature
         keys = np.stack(np.broadcast_arrays(self.frequency, self.reached, temperature))
@@ -174,7 +174,7 @@ class MeasuredSweep(MeasuredBase):
         return points, self.conditions.select(points), repeats.ravel()
 
     def response(self, model: Model, values: Values | None = None) -> Array:
-        """Stiffness of a model at the points of the sweep, (..., n) [N/m or N m/rad]; see `MeasuredBase`."""
+        """Return the stiffness of a model at the n points, (..., n) [N/m or N m/rad]; see `MeasuredBase`."""
         if values is None and (stiffness := self.recall("response", model)) is not None:
             return stiffness
         every = np.arange(self.order.size)
