@@ -16,7 +16,6 @@ from bushfit.reading.headers import (
     Extreme,
     Heading,
     Vocabulary,
-    is_angular,
     parse_unit,
     plain,
     plain_name,
@@ -31,7 +30,7 @@ from bushfit.reading.inference import (
     moves_along,
     name_parallel_spring,
 )
-from bushfit.reading.si_columns import column_of, first_numbers
+from bushfit.reading.si_columns import column_of, first_numbers, is_angular
 from bushfit.reading.table import Table
 from bushfit.reading.times import clock
 

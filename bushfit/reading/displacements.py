@@ -15,6 +15,7 @@ from bushfit.reading.loops import increasing_time, time_column
 from bushfit.reading.measurement import Floats
 from bushfit.reading.names import direction_of_file
 from bushfit.reading.si_columns import si_column
+from bushfit.reading.times import sampling_rate_above
 
 #: Smallest number of rows of a history, and largest number of evenly sampled rows; chosen: their results take 2 GB.
 FEWEST_ROWS, _MOST_ROWS = 10, 10_000_000
@@ -95,12 +96,12 @@ def read_displacements(
             )
         roles = dict.fromkeys(named_places, "displacement")
     wanted = {role: si_column(table, role, place) for place, role in roles.items()}
-    rate = None if "time" in table.roles else table.sampling_rate
+    rate, note = (None, "") if "time" in table.roles else sampling_rate_above(table)
     wanted |= {} if rate else {"time": time_column(table, next(iter(roles)))}
     values, notes = table.read(wanted, fewest_rows=FEWEST_ROWS)
     if rate:
         time = np.arange(next(iter(values.values())).size) / rate
-        more: tuple[str, ...] = (table.note_sampling,)
+        more: tuple[str, ...] = (note,)
     else:
         time, more = increasing_time(table.needing(wanted), wanted["time"], values["time"])
     with error_location(table.file, "time"):

@@ -53,12 +53,6 @@ ALL_COLUMNS = {
 }
 #: Roles with a common property, in a fixed order, by property (see words.toml).
 ROLE_SETS = {kind: dict.fromkeys(roles).keys() for kind, roles in WORDS["role_sets"].items()}
-#: Names of columns that assign rows to tests, by what they contain: direction, specimen_number, part_number or run.
-ROW_COLUMNS = {
-    **WORDS["rows"],
-    **{key: WORDS["above"][key] for key in ("specimen_number", "part_number")},
-    "run": [*SWEEP_COLUMNS["repeat"], "block"],
-}
 #: Convention by which an amplitude is stated.
 AmplitudeConvention = Literal["zero-to-peak", "peak-to-peak", "rms"]
 #: Largest or smallest value in each cycle of an oscillating quantity.
@@ -70,8 +64,6 @@ COUNTED: dict[AmplitudeConvention | None, str] = {
     "peak-to-peak": " p-p", "zero-to-peak": " 0-p", "rms": " rms", None: ""
 }  # fmt: skip
 Meant = TypeVar("Meant")
-#: Starts of the names of an angular frequency.
-_ANGULAR = ("angular", "angfreq", "omega", "ω", "kreisfrequenz", "pulsa", "角频率")
 #: Channel of a test rig in brackets: "Load(Linear:Load) (kN)".
 _CHANNEL = re.compile(r"\((?:[^()]|\([^()]*\))*[:|](?:[^()]|\([^()]*\))*\)")
 #: Loss factor written as a function, with brackets that do not contain a unit.
@@ -319,16 +311,6 @@ def fits(word: str, role: str, unit: str | None) -> bool:
     if unit and (expected := _UNITS_OF.get((word, role))):
         return any(units.is_compatible(unit, si) for si in expected)
     return not any(units.is_compatible(unit or "", si) for si in _UNITS_NOT_F.get((word, role), ()))
-
-
-def is_angular(header: str, unit: str) -> bool:
-    """Return True if a frequency column is angular (rad/s), by its unit, or by its header if the unit is 1/s."""
-    name = plain(_LOGARITHM.sub(r"\g<inner>", header, 1)) or plain(header)
-    return units.is_compatible(unit, "rad/s") or (
-        "hz" not in unit.lower()
-        and any(name.startswith(plain(word)) for word in _ANGULAR)
-        and units.is_compatible(unit, "Hz")
-    )
 
 
 @lru_cache(maxsize=4096)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from bushfit.reading.headers import ROW_COLUMNS, Vocabulary
+from bushfit.reading.headers import SWEEP_COLUMNS, WORDS, Vocabulary
 from bushfit.reading.measurement import Floats
 from bushfit.reading.names import named_direction
 from bushfit.reading.runs import group_rows
@@ -19,8 +19,14 @@ if TYPE_CHECKING:
 
 #: Smallest mean number of rows per distinct text in a column that assigns rows to tests; chosen: a row counter has one.
 _FEWEST_ROWS = 3
-#: Known names of columns that assign rows to tests.
-_LABELS = Vocabulary(ROW_COLUMNS)
+#: Known names of columns that assign rows to tests: of directions, specimen numbers, part numbers and runs.
+_LABELS = Vocabulary(
+    {
+        **WORDS["rows"],
+        **{key: WORDS["above"][key] for key in ("specimen_number", "part_number")},
+        "run": [*SWEEP_COLUMNS["repeat"], "block"],
+    }
+)
 
 
 class Rows(NamedTuple):

@@ -20,7 +20,7 @@ from pydantic import BeforeValidator
 from bushfit import units
 from bushfit.reading.headers import WORDS, Vocabulary, plain, split_convention, split_unit
 from bushfit.reading.numerals import is_like_number
-from bushfit.reading.roles import is_test, stated_once
+from bushfit.reading.roles import is_test, is_unit_alone, stated_once
 
 #: First words of rows that summarise others.
 _SUMMARIES = frozenset(map(plain, WORDS["rows_of"]["summary"]))
@@ -59,7 +59,6 @@ WITH_UNIT = re.compile(
 _WIDE_GAP = re.compile(" {3,}")
 #: Gap between columns whose headers contain single blanks.
 _COLUMN_GAP = re.compile(r"\t|\s{2,}")
-
 #: Cell of a line whose columns are separated by wide gaps.
 _CELL = re.compile(r"\S+(?: \S+)*")
 
@@ -199,10 +198,10 @@ def find_layout(
     candidates = list(_candidates(lines, before, delimiters, vocabulary))
     if header_line is None and not any(is_test(vocabulary.roles(cells)) for *_, cells in candidates):
         below = _candidates(lines, range(end, len(lines)), delimiters, vocabulary)
-        if later := next((one for one in below if one[0][1] and is_test(vocabulary.roles(one[3]))), None):
-            _, index, delimiter, headers = later
-            note = f"lines {lines[0].number} to {lines[index].number - 1} contain another table, which is left out"
+        tests = (one for one in below if one[0][1] and is_test(vocabulary.roles(one[3])))
+        for _, index, delimiter, headers in tests:
             layout = _layout(lines, vocabulary, index, delimiter, headers)
+            note = f"lines {lines[0].number} to {lines[index].number - 1} contain another table, which is left out"
             return replace(layout, notes=(*layout.notes, note))
     best = max(candidates, key=lambda candidate: candidate[0], default=None)
     if best is None:
@@ -244,12 +243,6 @@ def _candidates(
                 shorter = delimiter != " " and len(cells) < 2 * width < 2 * len(cells)  # empty cells at the end
                 followed = 2 if width == len(cells) else int(shorter)
                 yield (not is_note, followed, named_count, index, -order), index, delimiter, cells
-
-
-def is_unit_alone(header: str, vocabulary: Vocabulary) -> bool:
-    """Return True if a header has a unit in brackets but no known name."""
-    name, unit = units.split_header(split_convention(header)[0]) if header[-1:] in ("]", ")") else ("", None)
-    return bool(name and unit) and unit != "-" and vocabulary.heading(header) is None and units.is_unit(unit or "")
 
 
 def header_cells(content: Content, delimiter: str) -> Iterator[list[str]]:
@@ -379,8 +372,7 @@ def _layout(
     levels = stated_once(headers, (split(content, delimiter) for content in contents), vocabulary)
     names = ", ".join(f'"{headers[index]}"' for index in sorted(levels))
     notes = (f"{names}: an empty cell has the value of the cell above",) if levels else ()
-    layout = Layout(delimiter, tuple(headers), number, tuple(row), units_line, notes=notes, levels=levels)
-    return replace(layout, numbered=numbered)
+    return Layout(delimiter, tuple(headers), number, tuple(row), units_line, (), numbered, False, notes, levels)
 
 
 def _below_headers(header: str, row: str) -> list[str]:
@@ -399,13 +391,6 @@ def is_units_row(cells: Sequence[str]) -> bool:
     filled = [split_convention(cell.strip("[]() "))[0] for cell in cells if cell.strip("[]() ")]
     has_numbers = any(is_like_number(cell) and cell != "1" for cell in filled)
     return not has_numbers and 0 < len(filled) <= 2 * sum(units.is_unit(cell) for cell in filled)
-
-
-def begins_other_table(cells: Sequence[str]) -> bool:
-    """Return True if a row has names with units in brackets and no number, as the header of another table has."""
-    filled = [cell for cell in cells if cell]
-    in_brackets = [cell for cell in filled if cell[-1] in "])" and units.is_unit(units.split_header(cell)[1] or "?")]
-    return len(filled) > 1 and len(in_brackets) > 0 and not any(map(is_like_number, filled))
 
 
 def is_summary_row(cells: Sequence[str]) -> bool:

@@ -18,7 +18,7 @@ from bushfit.reading.si_columns import quantity_above, si_column
 from bushfit.reading.source import LEAST_VALUE
 from bushfit.reading.stated import LoopFile
 from bushfit.reading.table import Table
-from bushfit.reading.times import DAY, are_day_numbers, spread
+from bushfit.reading.times import DAY, are_day_numbers, sampling_rate_above, spread
 
 #: Latest time of a record [s]; chosen: the year 5138 in seconds since 1970, or March 1973 in milliseconds.
 _LATEST_SECOND = 1e11
@@ -46,7 +46,7 @@ def read_loop(
     """
     rows = Rows(test.direction, test.specimen_number, test.rows, shared)
     table = find_table(file, LOOP_COLUMNS, test.columns, test.units, test, direction.motion, rows)
-    stated_rate = None if test.states_time or "time" in table.roles else table.sampling_rate
+    stated_rate, note = (None, "") if test.states_time or "time" in table.roles else sampling_rate_above(table)
     test = replace(test, sampling_rate=stated_rate) if stated_rate else test
     wanted = loop_columns(table, direction, test)
     values, notes = table.read(wanted, fewest_rows=FEWEST_LOOP_ROWS)
@@ -79,7 +79,7 @@ def read_loop(
         notes = (*notes, *more)
     else:
         time = test.rebuild_time(displacement)
-        notes += (table.note_sampling,) if stated_rate else ()
+        notes += (note,) if stated_rate else ()
         if "time" in table.roles:
             notes += (f'"{table.roles["time"].header}" is not used, because the campaign states the time',)
     unknown = note_not_understood(table, table.row_labels, selected)
@@ -147,7 +147,7 @@ def time_column(table: Table, place: Place) -> Column:
     with suppress(ValueError):  # which the reading of the table reports
         values = table.read({"time": time}, fewest_rows=2)[0]["time"]
         step = (values[-1] - values[0]) / (values.size - 1)
-        rate = table.sampling_rate
+        rate, _ = sampling_rate_above(table)
         scales = [DAY] if are_day_numbers(values) else [1.0, 1e-3, 60.0] if rate else []
         fitting = [scale for scale in scales if scale == DAY or abs(rate * step * scale - 1.0) < _RATE_AGREEMENT]
         if fitting:

@@ -70,6 +70,13 @@ def row_fault(table: Table, cells: Sequence[str | float]) -> str | None:
     return None
 
 
+def begins_other_table(cells: Sequence[str]) -> bool:
+    """Return True if a row has names with units in brackets and no number, as the header of another table has."""
+    filled = [cell for cell in cells if cell]
+    in_brackets = [cell for cell in filled if cell[-1] in "])" and units.is_unit(units.split_header(cell)[1] or "?")]
+    return len(filled) > 1 and len(in_brackets) > 0 and not any(map(is_like_number, filled))
+
+
 def note_left_out(table: Table, rows: Sequence[FaultyRow], count: int) -> Iterator[str]:
     """Sentence on rows that are left out because they are not data, except repeated headers and rows of units.
 

@@ -2,8 +2,9 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 
+from bushfit import units
 from bushfit.geometry import STRAINING, Motion
-from bushfit.reading.headers import STRAINING_COLUMNS, SWEEP_COLUMNS, WORDS, Vocabulary
+from bushfit.reading.headers import STRAINING_COLUMNS, SWEEP_COLUMNS, WORDS, Vocabulary, split_convention
 
 #: Names of columns in a test of strain and modulus, by role; they replace those of loops and sweeps.
 _STRAINING = STRAINING_COLUMNS | {"amplitude": SWEEP_COLUMNS["amplitude"] + STRAINING_COLUMNS["amplitude"]}
@@ -44,6 +45,12 @@ def si_unit(role: str, motion: Motion) -> str:
         return "Pa" if motion is STRAINING else "J"
     unit = _UNITS.get(role, "1")
     return str(getattr(motion, unit, unit))
+
+
+def is_unit_alone(header: str, vocabulary: Vocabulary) -> bool:
+    """Return True if a header has a unit in brackets but no known name."""
+    name, unit = units.split_header(split_convention(header)[0]) if header[-1:] in ("]", ")") else ("", None)
+    return bool(name and unit) and unit != "-" and vocabulary.heading(header) is None and units.is_unit(unit or "")
 
 
 def is_test(roles: set[str]) -> bool:

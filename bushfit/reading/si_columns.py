@@ -21,8 +21,8 @@ from bushfit.reading.headers import (
     Column,
     Heading,
     Vocabulary,
-    is_angular,
     parse_unit,
+    plain,
     split_unit,
 )
 from bushfit.reading.names import named_quantities
@@ -34,6 +34,20 @@ if TYPE_CHECKING:
 
 #: Number above zero of a stated multiple of a unit, such as 200 N for the force of 1 V.
 _MULTIPLE = re.compile(r"^(?=[\d.]*[1-9])\d+\.?\d*(?=\s+[^\W\d_])")
+#: Starts of the names of an angular frequency.
+_ANGULAR = ("angular", "angfreq", "omega", "ω", "kreisfrequenz", "pulsa", "角频率")
+#: Start of the name of a logarithm, in the spelling that `plain` returns.
+_LOGARITHM = re.compile("log10|log|lg|ln")
+
+
+def is_angular(header: str, unit: str) -> bool:
+    """Return True if a frequency column is angular (rad/s), by its unit, or by its header if the unit is 1/s."""
+    name = _LOGARITHM.sub("", plain(header))
+    return units.is_compatible(unit, "rad/s") or (
+        "hz" not in unit.lower()
+        and any(name.startswith(plain(word)) for word in _ANGULAR)
+        and units.is_compatible(unit, "Hz")
+    )
 
 
 def si_column(table: Table, role: str, tested: Place, hint: str | None = None) -> Column:

@@ -19,14 +19,15 @@ from bushfit.geometry import TRANSLATION, Motion
 from bushfit.reading.headers import Column, Vocabulary
 from bushfit.reading.instruments import word_for_part
 from bushfit.reading.labelled import find_labels
-from bushfit.reading.layout import Layout, Line, begins_other_table, is_comment, is_row, is_summary_row
+from bushfit.reading.layout import Layout, Line, is_comment, is_row, is_summary_row
 from bushfit.reading.measurement import Floats
 from bushfit.reading.names import Labels, is_remark, labels_and_text_above
-from bushfit.reading.numerals import ALL_NUMERALS, Numerals, find_first_decimal, find_numerals, is_like_number
+from bushfit.reading.numerals import Numerals, find_first_decimal, find_numerals, is_like_number
 from bushfit.reading.parts import OpenedFile
 from bushfit.reading.rejected import (
     FaultyRow,
     bad_row,
+    begins_other_table,
     mark_missing,
     note_left_out,
     refuse_other_columns,
@@ -286,24 +287,6 @@ class Table:
         if hidden := [number for number in self.source.hidden if number > self.layout.header_line]:
             sentences.append(f"{len(hidden)} rows from row {hidden[0]} on are hidden in the workbook, but are read")
         return tuple(sentences)
-
-    @cached_property
-    def sampling_rate(self) -> float | None:
-        """Sampling rate [Hz] that a line above the table states clearly, in the notation of its numbers; else None."""
-        text, _, unit = (self.labels_above.sampling or "").partition(" ")
-        if not text:
-            return None
-        values = {way.value(text) for way in ALL_NUMERALS} - {None}
-        value = values.pop() if len(values) == 1 else self.numerals.value(text)
-        if not value:
-            return None
-        is_rate = units.is_compatible(unit, "Hz")
-        return value * units.si_factor(unit, "Hz") if is_rate else 1.0 / (value * units.si_factor(unit, "s"))
-
-    @property
-    def note_sampling(self) -> str:
-        """Note for the user that the time comes from the sampling rate above the table."""
-        return f"no time column: the rows are {self.sampling_rate:.6g} a second, as the lines above the table state"
 
     def agrees(self, role: str, expected: str) -> bool:
         """True if a column has a role such as "force", and a unit with the dimension of the unit `expected`."""

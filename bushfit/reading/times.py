@@ -1,11 +1,19 @@
 """Time of each row: clock times, dates, day numbers of spreadsheets, and rounded times."""
 
+from __future__ import annotations
+
 import re
 from datetime import datetime, timedelta
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bushfit import units
 from bushfit.reading.measurement import Floats
+from bushfit.reading.numerals import ALL_NUMERALS
+
+if TYPE_CHECKING:
+    from bushfit.reading.table import Table
 
 DAY = 86_400.0
 #: Clock: 20:07:10.100, 07:10,5, 8:07:10 PM; a duration may follow "1 day, ".
@@ -86,3 +94,19 @@ def spread(time: Floats) -> Floats | None:
     slope, start = np.polyfit(first[1:], time[first[1:]], 1)
     even = start + slope * row
     return even - even[0] + time[0] if np.all(np.abs(even - time) <= 1.01 * quantum) else None
+
+
+def sampling_rate_above(table: Table) -> tuple[float | None, str]:
+    """Find the sampling rate that a line above a table states clearly, in the notation of its numbers.
+
+    Returns:
+        Sampling rate [Hz], and a sentence for a table without a time column; None and "" if no line states it.
+    """
+    text, _, unit = (table.labels_above.sampling or "").partition(" ")
+    values = {way.value(text) for way in ALL_NUMERALS} - {None}
+    value = values.pop() if len(values) == 1 else table.numerals.value(text) if text else None
+    if not value:
+        return None, ""
+    is_rate = units.is_compatible(unit, "Hz")
+    rate = value * units.si_factor(unit, "Hz") if is_rate else 1.0 / (value * units.si_factor(unit, "s"))
+    return rate, f"no time column: the rows are {rate:.6g} a second, as the lines above the table state"
