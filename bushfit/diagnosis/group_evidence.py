@@ -53,7 +53,13 @@ def posterior(gram: Array, projections: Array) -> tuple[Array, Array, Array, Arr
         Increase of the log evidence by the columns, (..., sizes); mean amounts, (..., sizes, width); variances along
         the eigenvectors of `gram`, (..., sizes, width); and these eigenvectors, (..., width, width).
     """
-    values, vectors = (gram[..., 0], np.ones_like(gram)) if gram.shape[-1] == 1 else np.linalg.eigh(gram)
+    if gram.shape[-1] == 1:
+        values, vectors = gram[..., 0], np.ones_like(gram)
+    else:
+        try:
+            values, vectors = np.linalg.eigh(gram)
+        except np.linalg.LinAlgError:  # LAPACK fails, rarely, on many equal eigenvalues; the other triangle rounds anew
+            values, vectors = np.linalg.eigh(gram, UPLO="U")
     projections = np.einsum("...ij,...i->...j", vectors, projections)[..., None, :]
     prior_variance = np.square(SIZES)[:, None]
     grown = 1.0 + prior_variance * np.maximum(values, 0.0)[..., None, :]
