@@ -108,14 +108,15 @@ def _steady_part(loop: Loop, time: Array, motion: Array) -> tuple[Loop, str | No
     spans = steady_spans(loop, time, motion)
     if not spans:
         return loop, None
-    span = max(spans, key=lambda span: span.end - span.begin)
+    span = max(spans, key=lambda span: round(span.cycles))
     first, last = span.begin, span.end
     if first > time[0] and span.cycles > THREE_CYCLES:
         first += span.period  # after a run-in the first cycle still remembers it
     gaps = [f"{gap:.3g} s" if gap > _BRIEF * period else "" for gap in (first - time[0], time[-1] - last)]
     if not any(gaps):
         return loop, None
-    note = omitted_rows_sentence(gaps, (last - first) / span.period)
+    equal_cycles = sum(equal.cycles for equal in spans if equal is not span)
+    note = omitted_rows_sentence(gaps, (last - first) / span.period, equal_cycles)
     return _cut(loop, first, last if gaps[1] else np.inf), note
 
 

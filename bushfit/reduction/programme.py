@@ -1,13 +1,13 @@
 """Loop programmes: a record of several amplitudes or rates, one after the other, split into loops.
 
 The strokes of the motion, from one turning point to the next, are compared by their range and by the time between the
-crossings of their middles. A run of similar strokes is a part of the record; ramps, pauses and single cycles between
-the parts are omitted.
+crossings of their middles. A run of similar strokes between two rests is a part of the record; ramps, rests and single
+cycles between the parts are omitted.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import chain
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from bushfit.reading.measurement import Floats, Loop, RecordPart
 from bushfit.reading.stated import LoopFile
 from bushfit.reduction.cycles import lone_outliers, resumes_in_phase, shifted_difference, stretches
 from bushfit.reduction.harmonics import cycle_harmonics
-from bushfit.reduction.turning_points import middle_crossings, motion_turns
+from bushfit.reduction.turning_points import Integers, middle_crossings, motion_turns, moving_parts, prominent_turns
 
 #: Rows that are enough to find the cycles.
 ENOUGH_ROWS = 200_000
@@ -30,11 +30,6 @@ _SAME_RATE = 0.08
 _SAME_AMPLITUDE = 0.08
 #: Distance from an end of the record, relative to a cycle, up to which a part is extended to that end.
 _AT_END = 0.1
-#: Largest change in an eighth of a period, relative to the range, of a motion at rest, and smallest share of rest in a
-#: pause between two parts; chosen: a sine changes so little at its turning points, in 5 % of its rows.
-_AT_REST, _PAUSE_SHARE = 0.03, 0.15
-#: Number of cycles below which a part between two equal parts is their pause with the strokes beside it.
-_ONE_CYCLE = 1.2
 #: Smallest reported softening: absolute, and over the loss factor for a part after other cycles and a part from rest;
 #: chosen: less does not matter to a fit, and the memory of springpot and friction makes up to 0.15 and 0.6 of the loss
 #: factor.
@@ -99,9 +94,6 @@ def split_record(loop: Loop, test: LoopFile = _TIMED) -> tuple[Loop, ...]:
     if not spans:
         return (loop,)
     if all(span.is_like(spans[0]) for span in spans[1:]):
-        if any(_is_pause(time, motion, before.end, after.begin, before) for before, after in pairwise(spans)):
-            longest = max(spans, key=lambda span: round(span.cycles))  # the mean cycle of several sets would cancel
-            return tuple(replace(part, name=loop.name) for part in cut_loops(loop, time, [longest], test))
         return (replace(loop, softening=measure_softening(loop, spans[0], from_rest=True)),)
     return tuple(cut_loops(loop, time, spans, test))
 
@@ -125,32 +117,18 @@ def steady_spans(loop: Loop, time: Floats, motion: Floats) -> list[SteadySpan]:
     Raises:
         NoTestError: there are cycles, but no two of them are alike.
     """
-    turns, prominence = motion_turns(time, motion)
+    turns, noise = motion_turns(time, motion)
     if turns.size < 4:
         return []
-    height = motion[turns]
-    size = np.abs(np.diff(height))
-    across = middle_crossings(time, motion, turns, (height[1:] + height[:-1]) / 2.0)
-    # ranges are alike within 3 %, which rigs keep better and step by more, and within three deviations of the noise
-    same_size = 0.03 * size + 0.3 * prominence
-    spans: list[SteadySpan] = []
-    for strokes in _alike_runs(size, same_size):
-        halves = np.diff(across[strokes])
-        for run in _alike_runs(halves, _SAME_RATE * halves):
-            first, last = strokes.start + run.start, strokes.start + run.stop
-            begin, end = float(across[first]), float(across[last])
-            period, stroke = 2.0 * (end - begin) / (last - first), float(np.median(size[first : last + 1]))
-            span, previous = SteadySpan(begin, end, period, stroke), spans[-1] if spans else None
-            gap = (begin - previous.end) / previous.period if previous else np.inf
-            is_alike = previous and previous.is_like(span) and not _is_pause(time, motion, previous.end, begin, span)
-            if previous and is_alike and resumes_in_phase(gap, step=0.5):
-                spans[-1] = replace(previous, end=end)  # a disturbance broke it off
-            else:
-                spans.append(span)
-    between = zip(spans, spans[1:], spans[2:], strict=False)
-    bridges = [span for before, span, after in between if span.cycles < _ONE_CYCLE and before.is_like(after)]
-    spans = [span for span in spans if span not in bridges]
-    inner = size[1:-1]
+    parts = list[tuple[Floats, Floats, Integers]]()
+    for rows in moving_parts(time, motion, turns, noise):
+        inner = turns[(turns > rows.start) & (turns < rows.stop - 1)] - rows.start
+        ends = np.concatenate(([0], inner, [rows.stop - rows.start - 1]))
+        parts.append((time[rows], motion[rows], prominent_turns(motion[rows], ends, noise)))
+    spans = list(chain.from_iterable(_spans_of_part(*part, noise) for part in parts))
+    if not spans and len(parts) > 1:  # rests that belong to a wave, or one cycle between them
+        spans = _single_cycles(parts, noise) or _spans_of_part(time, motion, turns, noise)
+    inner = np.abs(np.diff(motion[turns]))[1:-1]
     if not spans and inner.size >= 4 and np.ptp(np.log(inner)) > 0.3:  # no rig misses its amplitude by a third
         unit, factor = loop.direction.display.displacement
         low, high = factor * inner.min() / 2.0, factor * inner.max() / 2.0
@@ -161,25 +139,66 @@ def steady_spans(loop: Loop, time: Floats, motion: Floats) -> list[SteadySpan]:
             expected="at least two cycles of one amplitude and rate",
             hint="record five cycles of each amplitude; for a road load, use bushfit respond or [[validation]]",
         )
+    return spans
+
+
+def _single_cycles(parts: Sequence[tuple[Floats, Floats, Integers]], noise: float) -> list[SteadySpan]:
+    """Return a span for each part between rests if all parts are closed single cycles; else none.
+
+    Args:
+        parts: time [s], displacement [m or rad] and turning points of each part, with both ends.
+        noise: smallest stroke that is not noise [m or rad].
+    """
+    spans = list[SteadySpan]()
+    senses = {bool(motion[turns[1]] > motion[turns[0]]) for _, motion, turns in parts}
+    for time, motion, turns in parts:
+        range_ = float(np.ptp(motion))
+        is_closed = abs(motion[-1] - motion[0]) < max(noise, SAME_MOTION * range_)
+        # half cycles of opposite sense between rests are no cycles
+        if not is_closed or not (turns.size == 4 or (turns.size == 3 and len(senses) == 1)):
+            return []
+        begin, end = float(time[0]), float(time[-1])
+        spans.append(SteadySpan(begin, end, end - begin, range_))
+    return spans
+
+
+def _spans_of_part(time: Floats, motion: Floats, turns: Integers, noise: float) -> list[SteadySpan]:
+    """Find the spans of constant amplitude and rate in a part of a record without rests.
+
+    Args:
+        time: time of each row [s], or row numbers, (n,).
+        motion: displacement without outliers [m or rad], (n,).
+        turns: row indices of the turning points, and of both ends.
+        noise: smallest stroke that is not noise [m or rad].
+    """
+    if turns.size < 4:
+        return []
+    height = motion[turns]
+    size = np.abs(np.diff(height))
+    across = middle_crossings(time, motion, turns, (height[1:] + height[:-1]) / 2.0)
+    # ranges are alike within 3 %, which rigs keep better and step by more, and within three deviations of the noise
+    same_size = 0.03 * size + 0.3 * noise
+    spans, last_stroke = list[SteadySpan](), 0
+    for strokes in _alike_runs(size, same_size):
+        halves = np.diff(across[strokes])
+        for run in _alike_runs(halves, _SAME_RATE * halves):
+            first, last = strokes.start + run.start, strokes.start + run.stop
+            begin, end = float(across[first]), float(across[last])
+            period, stroke = 2.0 * (end - begin) / (last - first), float(np.median(size[first : last + 1]))
+            span, previous = SteadySpan(begin, end, period, stroke), spans[-1] if spans else None
+            gap = (begin - previous.end) / previous.period if previous else np.inf
+            # a rest has too few strokes for its time
+            is_moving = np.count_nonzero(size[last_stroke + 1 : first] > 0.25 * stroke) > 2.0 * gap - 1.5
+            if previous and previous.is_like(span) and resumes_in_phase(gap, step=0.5) and is_moving:
+                spans[-1] = replace(previous, end=end)  # a disturbance broke it off
+            else:
+                spans.append(span)
+            last_stroke = last
     if not spans:
         return []
     before = [float(time[0]), *(span.end for span in spans[:-1])]
     after = [*(span.begin for span in spans[1:]), float(time[-1])]
     return [_extend_span(span, time, motion, *limits) for span, *limits in zip(spans, before, after, strict=True)]
-
-
-def _is_pause(time: Floats, motion: Floats, begin: float, end: float, span: SteadySpan) -> bool:
-    """Return True if the motion rests for a while between two parts of a record.
-
-    Args:
-        time: time of each row [s], or row numbers, (n,).
-        motion: displacement [m or rad], (n,).
-        begin, end: end of the first part and beginning of the second, in the unit of the time.
-        span: one of the parts.
-    """
-    rows = slice(*np.searchsorted(time, (begin, end)))
-    change = shifted_difference(time, motion, span.period / 8.0, rows)
-    return change.size > 0 and float(np.mean(change < _AT_REST * span.range)) > _PAUSE_SHARE
 
 
 def _alike_runs(values: Floats, reach: Floats) -> Iterator[slice]:
@@ -263,15 +282,18 @@ def cut_loops(loop: Loop, time: Floats, spans: Sequence[SteadySpan], test: LoopF
         last_end = span.end
 
 
-def omitted_rows_sentence(gaps: Iterable[str], cycles: float) -> str:
+def omitted_rows_sentence(gaps: Iterable[str], cycles: float, equal_cycles: float = 0.0) -> str:
     """Write a sentence on the omitted durations before and after the steady cycles, and on the number of cycles used.
 
     Args:
         gaps: durations before and after the steady cycles, formatted with a unit; "" for no gap.
         cycles: number of cycles used.
+        equal_cycles: number of cycles of the same amplitude and rate in the omitted durations.
     """
     parts = [f"{gap} {side} the steady cycles" for gap, side in zip(gaps, ("before", "after"), strict=True) if gap]
-    return f"{' and '.join(parts)} are left out; {cycles:.3g} cycles are used"
+    used = f"{cycles:.3g} cycle{'s are' if cycles > 1.005 else ' is'} used"
+    repeated = f", with further cycles like them ({equal_cycles:.3g})," * (equal_cycles > 0.0)
+    return f"{' and '.join(parts)}{repeated} are left out; {used}"
 
 
 def measure_softening(loop: Loop, span: SteadySpan, *, from_rest: bool) -> float | None:

@@ -19,6 +19,13 @@ _DWELL = 0.3
 _SAME_HALF_CYCLE = 0.1
 #: Smallest duration of a pause over that of the neighbouring half cycles; chosen: sawtooth waves are more even.
 _PAUSE = 2.5
+#: Change of the motion during a rest, relative to the stroke; chosen: rigs at rest creep by less.
+_REST_CHANGE = 0.02
+#: Smallest duration of a rest over that of half a cycle: inside a stroke, where a sine changes fast; at an end of the
+#: record; and at a turning point, where a wave may dwell; chosen.
+_REST, _REST_AT_END, _REST_AT_TURN = 0.1, 0.3, 2.0
+#: Strokes below this multiple of the noise are too small to find rests in them.
+_CLEAR = 10.0
 
 
 def reversals(value: NDArray[Any]) -> NDArray[np.bool_]:
@@ -135,6 +142,54 @@ def motion_turns(time: Floats, motion: Floats) -> tuple[Integers, float]:
     rippled &= duration < _PAUSE * neighbour
     ripple = rippled[half[fine]] & ~np.isin(fine, coarse)
     return reversal_rows(motion, fine[~ripple]), prominence
+
+
+def moving_parts(time: Floats, motion: Floats, turns: Integers, noise: float) -> list[slice]:
+    """Find the parts of a record between its rests, in which the displacement changes by no more than noise and creep.
+
+    Args:
+        time: time of each row [s], or row numbers, (n,).
+        motion: displacement [m or rad], (n,).
+        turns: row indices of the turning points, from `motion_turns`.
+        noise: smallest stroke that is not noise [m or rad].
+
+    Returns:
+        Slices of the rows, in order; one slice of all rows if the motion does not rest.
+
+    Notes:
+        The path is the distance travelled since the first row, without noise. A rest is a stretch of path of
+        2 % of a stroke (more if the noise is larger) that takes much longer than half a cycle before or after it, which
+        is a path of one stroke, suggests.
+    """
+    height = motion[turns]
+    stroke = np.repeat(np.arange(turns.size - 1), np.diff([0, *turns[1:-1], time.size]))
+    sizes = np.abs(np.diff(height))
+    padded = np.concatenate(([0.0], sizes, [0.0]))
+    whole = np.maximum(np.maximum(padded[:-2], padded[2:]), sizes)[stroke]  # the first and the last may be incomplete
+    size, base = sizes[stroke], (np.cumsum(sizes) - sizes)[stroke]
+    path = np.maximum.accumulate(base + np.sign(np.diff(height))[stroke] * (motion - height[stroke]))
+    band, last = np.maximum(noise, _REST_CHANGE * size), time.size - 1
+    end = np.searchsorted(path, path + band)
+    before = np.where(path < whole, 0.0, time - time[np.searchsorted(path, path - whole)])
+    half_end = np.searchsorted(path, path + band + whole)
+    after = np.where(half_end > last, 0.0, time[np.minimum(half_end, last)] - time[np.minimum(end, last)])
+    half = np.maximum(before, after)
+    position = (path - base) / size
+    is_inside = (position > 0.1) & (position + band / size < 0.9)
+    at_end = ((base == 0.0) & (position <= 0.1)) | (end > last)
+    factor = np.select([at_end, is_inside], [_REST_AT_END, _REST + 2.0 * band / size], _REST_AT_TURN)
+    starts = np.flatnonzero((time[end - 1] - time > factor * half) & (half > 0.0) & (size > _CLEAR * noise))
+    parts, begin = list[slice](), 0
+    if not starts.size:
+        return [slice(begin, time.size)]
+    borders = np.flatnonzero(starts[1:] > end[starts[:-1]])
+    for first, stop in zip(starts[np.append(0, borders + 1)], end[starts[np.append(borders, -1)]], strict=True):
+        distance = np.abs(motion[first:stop] - np.median(motion[first:stop]))
+        still = first + np.flatnonzero(distance <= 1.2 * np.quantile(distance, 0.9))  # without the motion around it
+        parts.append(slice(begin, int(still[0]) + 1))
+        begin = int(still[-1])
+    parts.append(slice(begin, time.size))
+    return [rows for rows in parts if rows.stop - rows.start > 2]
 
 
 def stroke_middles(height: Floats) -> Floats:

@@ -71,13 +71,52 @@ def test_a_ripple_is_no_loop(typed, root, tmp_path, ripple):
         assert float(said[0].split()[4]) == pytest.approx(ripple[0] / 100.0, rel=0.25)
 
 
-def test_a_fit_is_the_same_with_a_ripple(bushfit, work, own):
+def repeated(motion: Array, rest: Array, sets: int) -> Array:
+    return np.concatenate([motion, *[np.concatenate((rest, motion))] * (sets - 1)])
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.005])
+@pytest.mark.parametrize(
+    ("count", "sets", "rest", "shape"),
+    [
+        *[(3, 2, seconds, "sine") for seconds in (1.5, 5.0, 10.0, 20.0, 100.0)],
+        *[(1, 4, seconds, "sine") for seconds in (1.5, 10.0)],
+        (2, 3, 10.0, "triangle"),
+        (3, 2, 10.0, "creep"),
+        (3, 2, 10.0, "at the top"),
+    ],
+)
+def test_cycles_are_between_rests(typed, tmp_path, count, sets, rest, shape, noise):
+    phase = np.arange(0.0, count, 0.002) + 0.25 * (shape == "at the top")
+    cycles = np.sin(2.0 * np.pi * phase)
+    if shape == "triangle":
+        cycles = 2.0 / np.pi * np.arcsin(cycles)
+    still = cycles[0] + 0.01 * (shape == "creep") * np.linspace(0.0, 1.0, int(rest / 0.02))
+    motion = repeated(cycles, still, sets)
+    time, random = 0.02 * np.arange(motion.size), np.random.default_rng(1).standard_normal((2, motion.size))
+    force = 500.0 * motion + 80.0 * np.gradient(motion, time)
+    record(tmp_path / "axial.csv", time, motion + noise * random[0], force + random[1])
+    facts, odd = (inspected(typed, "axial.csv")[key] for key in ("facts", "odd"))
+    assert float(facts["cycles"].split(",")[0]) == pytest.approx(count, abs=0.51)
+    assert float(facts["frequency"].split()[0]) == pytest.approx(0.1, rel=5e-3)
+    assert float(facts["amplitude"].split()[0]) == pytest.approx(1.0, rel=0.01)
+    assert any("with further cycles like them" in sentence for sentence in odd)
+
+
+@pytest.mark.parametrize("kind", ["ripple", "rest"])
+def test_a_fit_is_the_same_with_a_ripple_or_after_a_rest(bushfit, work, own, kind):
     time, motion, force = measured(own)
-    record(own / "data/cmp_15961/loop_axial_1.csv", time, motion + sine(time, 0.5, 25.0), force)
-    bushfit("fit", own / CAMPAIGN, "-o", own / "rippled", "--no-plots")
-    clean, rippled = (load_result(folder / "model.json") for folder in (work / "model", own / "rippled"))
-    assert rippled.quality.nrmse == pytest.approx(clean.quality.nrmse, rel=0.05)
-    assert dict(rippled.model.values) == pytest.approx(dict(clean.model.values), rel=0.02)
+    if kind == "ripple":
+        motion = motion + sine(time, 0.5, 25.0)
+    else:
+        relaxing = force[-1] * np.exp(-time[1:1001] / 3.0)
+        motion, force = repeated(motion, np.zeros(1000), 2), repeated(force, relaxing, 2)
+        time = time[1] * np.arange(motion.size)
+    record(own / "data/cmp_15961/loop_axial_1.csv", time, motion, force)
+    bushfit("fit", own / CAMPAIGN, "-o", own / kind, "--no-plots")
+    clean, changed = (load_result(folder / "model.json") for folder in (work / "model", own / kind))
+    assert changed.quality.nrmse == pytest.approx(clean.quality.nrmse, rel=0.05)
+    assert dict(changed.model.values) == pytest.approx(dict(clean.model.values), rel=0.02)
 
 
 def small_tests(levels: Sequence[float], mean: float, wait: float) -> tuple[Array, Array]:
