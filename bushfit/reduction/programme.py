@@ -292,8 +292,8 @@ def omitted_rows_sentence(gaps: Iterable[str], cycles: float, equal_cycles: floa
     """
     parts = [f"{gap} {side} the steady cycles" for gap, side in zip(gaps, ("before", "after"), strict=True) if gap]
     used = f"{cycles:.3g} cycle{'s are' if cycles > 1.005 else ' is'} used"
-    repeated = f", with further cycles like them ({equal_cycles:.3g})," * (equal_cycles > 0.0)
-    return f"{' and '.join(parts)}{repeated} are left out; {used}"
+    unused = f", {equal_cycles:.3g} more of the same amplitude and rate are not" * (equal_cycles > 0.0)
+    return f"{' and '.join(parts)} are left out; {used}{unused}"
 
 
 def measure_softening(loop: Loop, span: SteadySpan, *, from_rest: bool) -> float | None:

@@ -162,16 +162,3 @@ def test_blocks_with_other_units_or_another_order_are_refused(first, second, wor
     done = typing(tmp_path)("inspect", "blocks.csv", "--direction", "axial", "--json", status=2)
     assert [word for word in words if word not in done.stderr] == []
     assert [path.name for path in tmp_path.iterdir()] == ["blocks.csv"]
-
-
-@pytest.mark.parametrize("pause", [2.0, 5.0, 10.0, 20.0])
-def test_a_pause_between_two_sets_of_cycles_is_left_out(pause, tmp_path):
-    rest = np.zeros(round(pause / 0.05))
-    motion, force = (np.concatenate([column, rest, column]) for column in (DISPLACEMENT, FORCE))
-    rows = np.column_stack([0.05 * np.arange(motion.size), motion, force])
-    np.savetxt(tmp_path / "loop.csv", rows, "%.7g", ",", header="time [s],displacement [mm],force [N]", comments="")
-    done = typing(tmp_path)("inspect", "loop.csv", "--direction", "axial", "--json", "--no-plots")
-    (seen,) = json.loads(done.stdout)["files"]
-    assert seen["facts"]["amplitude"].startswith("1 mm")
-    assert seen["facts"]["frequency"].startswith("0.1 Hz, a sine")
-    assert any("after the steady cycles are left out; 3 cycles are used" in sentence for sentence in seen["odd"])
