@@ -73,6 +73,7 @@ class RowFile:
         effects: effects that diagnose named.
         alternatives: effects that these tests cannot distinguish from the named effects.
         warnings: warnings of the fit and of the predictions.
+        warning_kinds: kind of each warning, as in bushfit/caveat.toml.
         quantities: parameters, NRMSE, reduced chi-square, stiffness and loss factor at the points, by name.
         measured: stiffness and loss factor as measured at the points, where known.
         at_bound: parameters whose fitted value is at a bound, with the bound: min or max.
@@ -91,6 +92,7 @@ class RowFile:
     effects: Sequence[str] = ()
     alternatives: Sequence[str] = ()
     warnings: Sequence[str] = ()
+    warning_kinds: Sequence[str] = ()
     quantities: Mapping[str, Estimate] = field(default_factory=dict)
     measured: Mapping[str, Estimate] = field(default_factory=dict)
     at_bound: Mapping[str, End] = field(default_factory=dict)

@@ -34,6 +34,7 @@ from bushfit.batch.quantities import (
 )
 from bushfit.campaign.quantities import convert_limits
 from bushfit.campaign.toml import parse_toml
+from bushfit.caveat import Caveat
 from bushfit.diagnosis import document
 from bushfit.effects.contract import Array
 from bushfit.errors import CampaignError
@@ -201,7 +202,7 @@ def read_limits(path: Path, rows: Sequence[Row]) -> Limits:
     return limits
 
 
-def resolve_limits(limits: Limits, values: Mapping[str, Array]) -> tuple[dict[str, tuple[float, float]], list[str]]:
+def resolve_limits(limits: Limits, values: Mapping[str, Array]) -> tuple[dict[str, tuple[float, float]], list[Caveat]]:
     """Compute the allowed range of each quantity; limits relative to the batch (`sigma`) need the values of all parts.
 
     Args:
@@ -209,9 +210,9 @@ def resolve_limits(limits: Limits, values: Mapping[str, Array]) -> tuple[dict[st
         values: values of the n parts by name of the quantity [SI], (n,), NaN for parts without a value.
 
     Returns:
-        Lowest and highest allowed value by name of the quantity [SI], and notes on limits that cannot be judged.
+        Lowest and highest allowed value by name of the quantity [SI], and warnings on limits that cannot be judged.
     """
-    allowed, notes = dict[str, tuple[float, float]](), list[str]()
+    allowed, notes = dict[str, tuple[float, float]](), list[Caveat]()
     for name, bounds in limits.bounds.items():
         allowed[name] = bounds.fixed
         if bounds.sigma is None:
@@ -220,9 +221,11 @@ def resolve_limits(limits: Limits, values: Mapping[str, Array]) -> tuple[dict[st
         sample = sample[np.isfinite(sample)]
         median, deviation = median_and_scatter(sample) if sample.size else (0.0, 0.0)
         if sample.size < bounds.at_least:
-            notes.append(f"{name}: {sample.size} parts, fewer than at_least = {bounds.at_least}: sigma is not judged")
+            sentence = f"{sample.size} parts, fewer than at_least = {bounds.at_least}: sigma is not judged"
+            notes.append(Caveat("sigma_not_judged", sentence).about(name))
         elif deviation == 0.0:
-            notes.append(f"{name}: more than half of the parts have exactly the same value: sigma is not judged")
+            sentence = "more than half of the parts have exactly the same value: sigma is not judged"
+            notes.append(Caveat("sigma_not_judged", sentence).about(name))
         else:
             (low, high), reach = bounds.fixed, bounds.sigma * deviation
             allowed[name] = max(low, median - reach), min(high, median + reach)

@@ -14,6 +14,7 @@ from bushfit.batch.document import Estimate, RowFile
 from bushfit.batch.manifest import Row, RowSettings
 from bushfit.batch.quantities import FIT_QUALITY, LOSS_FACTOR, STIFFNESS, Point, measured_at, measured_curve
 from bushfit.campaign.campaign import Campaign, load_campaign
+from bushfit.caveat import Caveat, to_entries
 from bushfit.effects import get_effect
 from bushfit.errors import BatchError, BushfitError, ModelError
 from bushfit.fitting.prepared_campaign import PreparedCampaign
@@ -132,7 +133,7 @@ def evaluate(row: Row, points: Sequence[Point], formats: Formats) -> tuple[RowFi
         verdict=diagnosis.verdict if diagnosis else None,
         effects=[effect.label for effect in effects],
         alternatives=[*dict.fromkeys((*(name for effect in effects for name in effect.alternatives), *twins))],
-        warnings=warnings_of(result, [*warnings, response_warnings], diagnosis.notes if diagnosis else ()),
+        **to_entries(warnings_of(result, [*warnings, response_warnings], diagnosis.notes if diagnosis else ())),
         quantities=quantities,
         measured=measured,
         at_bound=at_bound,
@@ -143,7 +144,7 @@ def evaluate(row: Row, points: Sequence[Point], formats: Formats) -> tuple[RowFi
 
 def run_commands(
     campaign: Campaign, settings: RowSettings, formats: Formats
-) -> tuple[Result, Diagnosis | None, dict[str, bytes], list[str]]:
+) -> tuple[Result, Diagnosis | None, dict[str, bytes], list[Caveat]]:
     """Run the commands on one campaign: run alone, or any of fit, diagnose, predict and respond, in this order.
 
     Args:
@@ -185,14 +186,14 @@ def run_commands(
     assert result is not None  # the manifest refuses rows without fit, diagnose or model
     if "predict" in commands:
         files |= encode_all(predict(result, campaign).files, with_tables)
-    warnings = list[str]()
+    warnings = list[Caveat]()
     if "respond" in commands and settings.history:
         response = respond(result, settings.history, lowpass=settings.lowpass)
         files, warnings = files | encode_all(response.files, with_tables), list(response.warnings)
     return result, diagnosis, files, warnings
 
 
-def estimate_quantities(result: Result, points: Sequence[Point]) -> tuple[dict[str, Estimate], list[Sequence[str]]]:
+def estimate_quantities(result: Result, points: Sequence[Point]) -> tuple[dict[str, Estimate], list[Sequence[Caveat]]]:
     """Estimate parameters, quality of the fit, and stiffness and loss factor at operating points, with intervals.
 
     Returns:
@@ -201,7 +202,7 @@ def estimate_quantities(result: Result, points: Sequence[Point]) -> tuple[dict[s
     Raises:
         BatchError: an amplitude with a wrong unit, such as an angle in the axial direction.
     """
-    estimates, warnings = dict[str, Estimate](), list[Sequence[str]]()
+    estimates, warnings = dict[str, Estimate](), list[Sequence[Caveat]]()
     for name, parameter in result.model.parameters.items():
         low, high = result.interval(name) or (None, None)
         stderr = result.covariance.stderr(name)

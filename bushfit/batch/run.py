@@ -15,6 +15,7 @@ from bushfit.batch.document import RowFile
 from bushfit.batch.executor import Workers, run_rows
 from bushfit.batch.junit import junit_report
 from bushfit.batch.summary import BatchPlan, BatchResult
+from bushfit.caveat import Caveat
 from bushfit.errors import OutputError
 from bushfit.progress import track
 from bushfit.report import plots
@@ -101,11 +102,11 @@ def run_batch(
         raise unwritable(output, error) from error
 
 
-def remove_unlisted_parts(plan: BatchPlan) -> list[str]:
+def remove_unlisted_parts(plan: BatchPlan) -> list[Caveat]:
     """Remove results of an earlier batch for parts that are not in this batch; a batch that resumes keeps them.
 
     Returns:
-        List with a sentence on these results; empty if there are none.
+        List with a warning on these results; empty if there are none.
     """
     current = {row.folder for row in plan.rows}
     records = (plan.task.output / store.ROWS_FOLDER).glob(f"*/{store.ROW_FILE}")
@@ -114,7 +115,8 @@ def remove_unlisted_parts(plan: BatchPlan) -> list[str]:
     several = "bushings of an earlier batch that are" if len(folders) > 1 else "bushing of an earlier batch that is"
     for folder in () if plan.task.resume else folders:
         shutil.rmtree(folder)
-    return [f"results of {len(folders)} {several} not in this batch {outcome}"] if folders else []
+    sentence = f"results of {len(folders)} {several} not in this batch {outcome}"
+    return [Caveat("earlier_results", sentence)] if folders else []
 
 
 def batch_files(result: BatchResult) -> list[ResultFile]:

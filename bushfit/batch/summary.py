@@ -19,12 +19,11 @@ from bushfit.batch.manifest import Row
 from bushfit.batch.quantities import FIT_NAMES, STIFFNESS, PartQuantity, list_quantities, parse_point, point_quantity
 from bushfit.batch.row import RowTask
 from bushfit.batch.store import ROWS_FOLDER
+from bushfit.caveat import Caveat, to_entries
 from bushfit.effects import is_parameter
 from bushfit.effects.contract import Array
 from bushfit.effects.unnamed import NAME as UNNAMED
-from bushfit.fitting.procedures import NEXT
 from bushfit.model.covariance import Z95
-from bushfit.prediction.caveats import BEYOND
 from bushfit.reduction.arrays import median_and_scatter
 from bushfit.report.batch_document import BatchFile, PartTable, QuantityTable
 from bushfit.report.results import Formats
@@ -39,6 +38,9 @@ _PARAMETER_COLUMNS = {"": 0, ", std error": 3, ", low": 1, ", high": 2}
 _POINT_COLUMNS = {"": 0, ", low": 1, ", high": 2}
 #: Name of the measured curve among the compared quantities.
 _CURVE = "measured stiffness"
+#: Kinds of warnings on a misfit whose cause a diagnosis may find, and on points outside the tested range.
+_MISFITS = {"misfit", "model_error", "levels_disagree", "unfitted_test_missed"}
+_EXTRAPOLATIONS = {"extrapolated_frequency", "extrapolated_strain", "extrapolated_rate", "extrapolated_stroke"}
 #: Maximum number of names in a sentence.
 _NAMES_LISTED = 10
 
@@ -73,14 +75,14 @@ class BatchResult:
         records: records of the rows, in the order of the manifest.
         kept_count: number of rows kept from an earlier run.
         seconds: duration of the run [s].
-        notes: sentences on results of an earlier batch in the folder.
+        notes: warnings on results of an earlier batch in the folder.
     """
 
     plan: BatchPlan
     records: Sequence[RowFile]
     kept_count: int
     seconds: float
-    notes: Sequence[str]
+    notes: Sequence[Caveat]
 
     @cached_property
     def estimates(self) -> dict[str, Array]:
@@ -109,8 +111,8 @@ class BatchResult:
         return list_quantities(self.estimates, self.plan.task.points)
 
     @cached_property
-    def allowed(self) -> tuple[dict[str, tuple[float, float]], list[str]]:
-        """Lowest and highest allowed value of each quantity with limits [SI], and notes on limits not judged."""
+    def allowed(self) -> tuple[dict[str, tuple[float, float]], list[Caveat]]:
+        """Lowest and highest allowed value of each quantity with limits [SI], and warnings on limits not judged."""
         values = {name: column[0] for name, column in self.estimates.items()}
         return resolve_limits(self.plan.limits, values) if self.plan.limits else ({}, [])
 
@@ -191,7 +193,7 @@ class BatchResult:
             not_judged=not_judged,
             differ=differ,
             headline=headline,
-            warnings=self.warnings(parts),
+            **to_entries(self.warnings(parts)),
             detectable=smallest_deviation(count, len(self.compared_values)),
             quantities={column.header: self.quantity_table(name, column) for name, column in columns.items()},
             curve_points=[*self.curves],
@@ -271,19 +273,20 @@ class BatchResult:
             deviations={name: round(z, 2) for name, z in outlying.items()},
             differs="; ".join(f"{name} {number(round(100.0 * relative[name], 2), 3, '+')} %" for name in outlying),
             warnings=record.warnings,
+            warning_kinds=record.warning_kinds,
             labels=labels,
             values=[float(value) if np.isfinite(value) else None for value in values],
             curve=curve if curve and np.isfinite(curve).all() else None,
         )
 
-    def warnings(self, parts: Sequence[PartTable]) -> list[str]:
+    def warnings(self, parts: Sequence[PartTable]) -> list[Caveat]:
         """Warnings of the whole batch, the important ones first.
 
         Args:
             parts: entries of `batch.json`.
 
         Returns:
-            Sentences that name the parts.
+            Warnings that name the parts.
         """
 
         def listed(names: Sequence[str]) -> str:
@@ -291,26 +294,33 @@ class BatchResult:
             more = f" and {len(names) - _NAMES_LISTED} more" if len(names) > _NAMES_LISTED else ""
             return ", ".join(names[:_NAMES_LISTED]) + more
 
-        at_bound, warnings = dict[str, list[str]](), list[str]()
+        at_bound, warnings = dict[str, list[str]](), list[Caveat]()
         for part, record in zip(parts, self.records, strict=True):
             for parameter in record.at_bound:
                 at_bound.setdefault(parameter, []).append(part.name)
         if poor := [part.name for part in parts if part.poor_fit]:
             judged = "; their limits are judged on measured points, if such points exist" if self.plan.limits else ""
-            warnings.append(f"the model misses the tests of {listed(poor)}: do not use their parameters{judged}")
-        missing = [part.name for part in parts if not part.poor_fit and any(NEXT in line for line in part.warnings)]
+            sentence = f"the model misses the tests of {listed(poor)}: do not use their parameters{judged}"
+            warnings.append(Caveat("part_misses_tests", sentence))
+        missing = [
+            part.name
+            for part, record in zip(parts, self.records, strict=True)
+            if not (part.poor_fit or record.verdict or _MISFITS.isdisjoint(part.warning_kinds))
+        ]
         if missing:
-            misfit = f"the model misses the tests of {listed(missing)} by more than their noise"
-            warnings.append(f"{misfit}: --command diagnose looks for the cause")
+            sentence = f"the model misses the tests of {listed(missing)} by more than their noise"
+            warnings.append(Caveat("part_misfit", f"{sentence}: --command diagnose looks for the cause"))
         if lacking := [part.name for part, lacks in zip(parts, self.lacks_sweep, strict=True) if lacks]:
-            warnings.append(f"no sweep, unlike the other parts, and so not compared with them: {listed(lacking)}")
+            sentence = f"no sweep, unlike the other parts, and so not compared with them: {listed(lacking)}"
+            warnings.append(Caveat("part_without_sweep", sentence))
         warnings += [*self.allowed[1], *self.notes]
         if at_bound:
             clauses = [f"{parameter} of {listed(names)}" for parameter, names in at_bound.items()]
-            warnings.append(f"at a bound of the fit, because the tests do not determine them: {'; '.join(clauses)}")
-        if outside := [part.name for part in parts if any(BEYOND in line for line in part.warnings)]:
+            sentence = f"at a bound of the fit, because the tests do not determine them: {'; '.join(clauses)}"
+            warnings.append(Caveat("part_at_bound", sentence))
+        if outside := [part.name for part in parts if not _EXTRAPOLATIONS.isdisjoint(part.warning_kinds)]:
             sentence = "a point is outside the tested range, where no test confirms the model"
-            warnings.append(f"{sentence}: {listed(outside)}")
+            warnings.append(Caveat("part_extrapolated", f"{sentence}: {listed(outside)}"))
         return warnings
 
     def table(self) -> pd.DataFrame:

@@ -8,6 +8,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from bushfit.caveat import Caveat
 from bushfit.reading.measurement import Loop, Source, Sweep
 
 #: Minimum number of identical points that are copies; chosen: fewer may agree by chance in rounded files.
@@ -51,7 +52,8 @@ def without_copied_tests(tests: Sequence[_Test]) -> list[_Test]:
     remaining = []
     for first, *copies in group_copies(tests):
         files = [copy.source.file.name if copy.source else copy.name for copy in copies]
-        remaining.append(_with_note(first, f"{_join_names(files)} with the same data: used once") if files else first)
+        note = Caveat("copied_tests", f"{_join_names(files)} with the same data: used once") if files else None
+        remaining.append(_with_note(first, note) if note else first)
     return remaining
 
 
@@ -79,9 +81,10 @@ def without_copied_repeats(sweep: Sweep) -> Sweep:
     names = ("frequency", "amplitude", "stiffness", "repeat", "reached", "relative_error", "temperature")
     columns = {name: getattr(sweep, name) for name in names}
     columns = {name: values[~is_copy] for name, values in columns.items() if isinstance(values, np.ndarray)}
-    note = (
+    note = Caveat(
+        "copied_repeats",
         f"{points} points of repeat{'s' * (len(repeats) > 1)} {_join_names([*map(str, repeats)])} are exact copies of "
-        "an earlier repeat and are left out; row numbers in messages do not count the copies"
+        "an earlier repeat and are left out; row numbers in messages do not count the copies",
     )
     return _with_note(replace(sweep, **columns), note)
 
@@ -95,8 +98,8 @@ def _fingerprint(sweep: Sweep, rows: NDArray[np.bool_] | slice = slice(None)) ->
     return numbers[:, np.lexsort(numbers[::-1])].tobytes()
 
 
-def _with_note(test: _Test, note: str) -> _Test:
-    """Add a sentence to the notes on how the file of a test was read."""
+def _with_note(test: _Test, note: Caveat) -> _Test:
+    """Add a warning to the notes on how the file of a test was read."""
     source: Source | None = test.source
     return replace(test, source=source and source.with_note(note))
 

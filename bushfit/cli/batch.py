@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from bushfit.caveat import to_caveats
 from bushfit.cli.options import command_called, direction_option, file_option, flag, option, option_group
 from bushfit.cli.output import Output, with_output
 from bushfit.errors import error_location
@@ -132,7 +133,7 @@ def _print_result(output: Output, result: BatchResult, folder: Path) -> None:
             output.print(line)
         if len(lines) > _MOST_SHOWN:
             output.print(f"... and {len(lines) - _MOST_SHOWN} more that {attention}: see {table}")
-    output.warn(document.warnings)
+    output.warn(to_caveats(document.warnings, document.warning_kinds))
     rows = []
     for header, quantity in document.quantities.items():
         name, unit = split_header(header)

@@ -88,12 +88,13 @@ def _print_comparison(output: Output, name: str, compared: ComparisonOutput) -> 
 
     content, families = compared.content, compared.content.families
     first, *labels = content.names
+    notes = [note.text for note in compared.notes]
     if families:
         verdict, *advice = compared.advice
         best = max(families, key=lambda family: family.probability)
         effects = "" if best is families[0] else "".join(f" --effect {name}" for name in best.name.split("+"))
         action = f"next: bushfit fit {quote_path(Path(content.compared[0].source))}{effects}"
-        sentences = [*advice, *compared.notes, *(compared.words if output.verbose else ())]
+        sentences = [*advice, *notes, *(compared.words if output.verbose else ())]
     else:
         different = []
         for label, comparison in zip(labels, compared.comparisons, strict=True):
@@ -104,7 +105,7 @@ def _print_comparison(output: Output, name: str, compared: ComparisonOutput) -> 
         if not different:
             verdict = f"no stiffness, loss factor or parameter differs from that of {first} by more than chance"
             action = "the compounds agree within the intervals below"
-        sentences = [*compared.notes, *compared.words]
+        sentences = [*notes, *compared.words]
     output.print_headline(name, verdict, action)
     for sentence in sentences:
         output.print(sentence)
@@ -121,4 +122,4 @@ def _print_comparison(output: Output, name: str, compared: ComparisonOutput) -> 
     if families:
         title = "families; held out: root mean square in units of noise (1: noise alone)"
         output.print_table(title, FAMILY_HEADS, family_cells(content))
-    output.warn(line for line in compared.warnings if line not in compared.notes)
+    output.warn(warning for warning in compared.warnings if warning not in compared.notes)

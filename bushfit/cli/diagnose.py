@@ -94,7 +94,7 @@ def print_diagnosis(output: Output, diagnosed: DiagnosisOutput) -> None:
     if has_more or output.verbose:
         title = "model with the added effects" if has_more else "model"
         print_parameters(output, title, diagnosis.result)
-    output.warn(diagnosed.document["warnings"])
+    output.warn(diagnosis.warnings)
 
 
 def print_verdict(output: Output, diagnosed: DiagnosisOutput, action: str = "") -> None:

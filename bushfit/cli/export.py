@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from bushfit.caveat import to_caveats
 from bushfit.cli.options import FILE, command_called, flag, option, option_group
 from bushfit.cli.output import Output, with_output
 from bushfit.cli.shared_options import prediction_options, quantity, static_rate_option
@@ -109,5 +110,5 @@ def command(model: Path, formats: tuple[str, ...], campaign: Path | None, output
         output.print(
             f"{remaining} more limit{'s' * (remaining > 1)} of the formats: -v prints all; the files state them"
         )
-    output.warn(document["warnings"])
+    output.warn(to_caveats(document["warnings"], document["warning_kinds"]))
     output.write(folder, files, document, input_files(loaded, file))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +17,9 @@ if TYPE_CHECKING:
 
     from bushfit.campaign.schema import Loss
     from bushfit.commands.fit import FitOutput
+
+#: Kinds of warnings that the model misses the tests.
+_MISFITS = {"misfit", "model_error", "given_values_miss"}
 
 
 @command_called("fit-static", "configs/cmp_15961.toml")
@@ -122,7 +124,8 @@ def _print_and_write(
     campaign, result, file = fitted.data.campaign, fitted.result, quote_path(fitted.data.campaign.path)
     written = quote_path(folder / f"{fitted.files[0].name}.json")
     verdict, action = "nothing was fitted: the tests are not compared", f"bushfit predict {written}"
-    misses = any(re.search(r"\bmiss(es)? the (tests|data)\b", line) for line in result.warnings)
+    by_kind = {warning.kind: warning.text for warning in result.warnings}
+    misses = not _MISFITS.isdisjoint(by_kind)
     if quality := result.quality:
         figures = (
             f"NRMSE {number(100 * quality.nrmse, 2)} %, reduced chi-square {number(quality.reduced_chi_square, 3)}"
@@ -133,7 +136,7 @@ def _print_and_write(
             action = action if result.fitted else f"free a parameter in [fit] of {file}, and fit again"
     if fitted.files[0].name == "static":
         action = f"bushfit fit-dynamic {file} --static {written} fits m and alpha"
-    elif units := next((line for line in result.warnings if re.search("impossible for rubber.*units", line)), ""):
+    elif units := by_kind.get("implausible_modulus"):
         verdict, action = units, f"bushfit diagnose {file} finds the file with the wrong unit"
     elif not misses and (left_open := result.covariance.describe_unknown(result.model.values)):
         verdict, action = left_open, f"bushfit plan {file} --hours 1 chooses tests that determine them"

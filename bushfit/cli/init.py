@@ -99,7 +99,7 @@ def command(files: tuple[Path, ...], name: str | None, no_input: bool, output: O
         facts = [f"{key}: {fact}" for key, fact in inspection.facts.items() if key in wanted or key.startswith("from ")]
         test = inspection.file.parent / inspection.label
         output.print(f"{test}: {inspection.kind}, {inspection.direction}; {'; '.join(facts)}")
-        output.warn([f"{inspection.label}: {sentence}" for sentence in inspection.odd])
+        output.warn(warning.about(inspection.label) for warning in inspection.odd)
     for sentence, count in Counter(inspection.assumed for inspection in inspections).items():
         if sentence:
             output.print(f"{count} test{'s' * (count > 1)}: {sentence}")

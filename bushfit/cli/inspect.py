@@ -68,8 +68,8 @@ def command(files: tuple[Path, ...], test_options: Mapping[str, Any], output: Ou
             print_inspection(output, inspections[-1])
     compared = with_contradictions(inspections)
     for alone, inspection in zip(inspections, compared, strict=True):
-        for sentence in inspection.odd[len(alone.odd) :]:
-            output.console.print(f"[yellow]unusual:[/yellow] {escape(inspection.label)}: {escape(sentence)}")
+        for warning in inspection.odd[len(alone.odd) :]:
+            output.console.print(f"[yellow]unusual:[/yellow] {escape(inspection.label)}: {escape(warning.text)}")
     inspections = with_specimens_named(compared)
     text = pasted_text(inspections)
     if not output.as_json:
@@ -109,7 +109,7 @@ def print_inspection(output: Output, inspection: Inspection) -> None:
         output.print(f"  {label}: {value}")
     if inspection.assumed:
         output.print(f"  {inspection.assumed}")
-    for sentence in inspection.odd:
-        console.print(f"  [yellow]unusual:[/yellow] {escape(sentence)}")
+    for warning in inspection.odd:
+        console.print(f"  [yellow]unusual:[/yellow] {escape(warning.text)}")
     if not inspection.odd:
         console.print("  nothing unusual")

@@ -9,6 +9,7 @@ import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from operator import attrgetter
 from pathlib import Path
 from time import monotonic
 from typing import Any, Literal, get_args
@@ -21,6 +22,7 @@ from rich.markup import escape
 from rich.segment import Segment
 from rich.table import Table
 
+from bushfit.caveat import GENERAL, Caveat
 from bushfit.cli.options import Folder, Parameter, flag, option, option_group
 from bushfit.errors import printable
 from bushfit.progress import report_progress_to
@@ -88,7 +90,7 @@ class Output:
     quiet: bool
     as_json: bool
     force: bool
-    _warnings: dict[str, None] = field(default_factory=dict)
+    _warnings: dict[Caveat, None] = field(default_factory=dict)
     _headlines: list[str] = field(default_factory=list)
 
     @property
@@ -126,27 +128,23 @@ class Output:
         if action:
             self.print(f"  {action}")
 
-    def warn(self, warnings: Iterable[str]) -> None:
+    def warn(self, warnings: Iterable[Caveat]) -> None:
         """Collect warnings, to print them once below the results of a command."""
         self._warnings.update(dict.fromkeys(warnings))
 
     def print_warnings(self) -> None:
         """Print the most important collected warnings, one of each kind; with -v all."""
-        if not self._warnings:
-            return
-        from bushfit.prediction.caveats import by_importance, consequence_of, without_numbers
-
-        warnings = by_importance(self._warnings)
+        warnings = sorted(self._warnings, key=attrgetter("rank"))
         if not self.verbose:
-            warnings = [line for line in warnings if not any(line in verdict for verdict in self._headlines)]
-        distinct: dict[str, str] = {}
-        for line in warnings:
-            distinct.setdefault(without_numbers(line.partition(": ")[2] or line), line)
+            warnings = [one for one in warnings if not any(one.text in verdict for verdict in self._headlines)]
+        distinct = dict[str, Caveat]()
+        for warning in warnings:
+            distinct.setdefault(warning.kind, warning)
         printed = warnings if self.verbose else [*distinct.values()][:_MOST_WARNINGS]
         for warning in printed:
-            self.console.print(f"[yellow]warning:[/yellow] {escape(warning)}")
-            if (use := consequence_of(warning)) != consequence_of(""):  # which is said of warnings of no known kind
-                self.print(f"  {use}")
+            self.console.print(f"[yellow]warning:[/yellow] {escape(warning.text)}")
+            if warning.consequence != GENERAL:
+                self.print(f"  {warning.consequence}")
         if remaining := len(warnings) - len(printed):
             self.print(f"{remaining} more warning{'s' * (remaining > 1)}: -v prints all; the result files contain them")
         self._warnings.clear()

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from bushfit.caveat import to_caveats
 from bushfit.cli.options import FILE, command_called, direction_option, file_option, option, option_group
 from bushfit.cli.output import Output, with_output
 from bushfit.cli.shared_options import grid_options, number_up_to, quantity
@@ -161,7 +162,7 @@ def _print_plan(output: Output, plan: Plan) -> None:
     _print_effects(output, document)
     if document["enough"]:
         output.print(document["enough"])
-    output.warn(document["warnings"])
+    output.warn(to_caveats(document["warnings"], document["warning_kinds"]))
 
 
 def _print_tests(output: Output, plan: Plan) -> None:

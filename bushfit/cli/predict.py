@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -128,17 +129,16 @@ def _bushing_of(result: Result, text: str) -> Bushing | str:
 
 def _print_summary(output: Output, predicted: PredictionOutput) -> None:
     """Print the permitted use of the prediction, and the range of stiffness and loss factor for each direction."""
-    from bushfit.prediction.caveats import by_importance, consequence_of
     from bushfit.units import format_range
 
     places = list(dict.fromkeys(str(prediction.direction) for prediction in predicted.predictions))
     verdict = f"{', '.join(places)} predicted with 95 % bands"
     action = "The prediction may be used: there are no warnings."
-    if warnings := by_importance(predicted.warnings):
+    if warnings := predicted.warnings:
         verdict += f", with {len(warnings)} warning{'s' * (len(warnings) > 1)}"
-        place = warnings[0].partition(": ")[0]
-        subject = f"{place}: " if place in places else ""
-        action = f"first warning below: {subject}{consequence_of(warnings[0])}"
+        first = min(warnings, key=attrgetter("rank"))
+        subject = f"{first.subject}: " if first.subject in places else ""
+        action = f"first warning below: {subject}{first.consequence}"
     output.print_headline(predicted.result.name, verdict, action)
     for prediction in predicted.predictions:
         force, loss = prediction.direction.display.stiffness, prediction.loss_factor.value

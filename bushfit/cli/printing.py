@@ -33,16 +33,16 @@ def print_validations(output: Output, validations: Sequence[Validation], before:
         output.print_table(title, list(table.columns), rows, text_columns=2)
     for validation in validations:
         source = validation.record.source
-        sentences = (*(source.notes if source else ()), *validation.response.warnings)
-        output.warn(f"{validation.record.name}: {sentence}" for sentence in sentences)
+        warnings = (*(source.notes if source else ()), *validation.response.warnings)
+        output.warn(warning.about(validation.record.name) for warning in warnings)
 
 
 def print_step(output: Output, title: str, result: Result, source: str = "") -> None:
-    """Print a fit result with its warnings, which begin with `source`, and with -v its equation and input files."""
+    """Print a fit result with its warnings, which name the file `source`, and with -v its equation and input files."""
     from bushfit.prediction.caveats import warnings_of
 
     print_result(output, title, result)
-    output.warn(f"{source}{line}" for line in warnings_of(result))
+    output.warn(warning.about(source) if source else warning for warning in warnings_of(result))
     print_origin(output, result)
 
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from bushfit.caveat import to_entries
 from bushfit.cli.file_options import direction_error, metadata_options, options_named
 from bushfit.cli.options import command_called, option, option_group
 from bushfit.cli.output import Output, with_output
@@ -101,7 +102,10 @@ def command(files: tuple[Path, ...], levels: str | None, cycles: int, output: Ou
     file = output.formats.table("sweep")
     snippet = f'[[sweeps]]\nfile = "{file}"\n{body} = {json.dumps(name, ensure_ascii=False)}\n'
     document = {body: name, "points": points.to_dict(orient="list"), **document}
-    document |= {"warnings": list(warnings), "campaign": snippet}
+    document |= {
+        **to_entries(warnings),
+        "campaign": snippet,
+    }
     results = [ResultFile("sweep", "table", points), ResultFile("reduce", "figure", figure)]
     output.write(folder, results, document, files)
     output.print(f"for a campaign in {folder} (in another folder, add the path):\n\n{snippet}")

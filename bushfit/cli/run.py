@@ -82,11 +82,11 @@ def print_run(output: Output, name: str, outcome: RunOutput, action: str) -> Non
     two_step, joint = outcome.two_step, outcome.joint.result
     if output.verbose:
         for title, step in outcome.static.steps if outcome.static else ():
-            print_step(output, f"{name}: {title}", step, "static.json: ")
+            print_step(output, f"{name}: {title}", step, "static.json")
         if two_step:
-            print_step(output, f"{name}: static and dynamic fit in turn", two_step.result, "dynamic.json: ")
+            print_step(output, f"{name}: static and dynamic fit in turn", two_step.result, "dynamic.json")
         if outcome.added:
-            print_step(output, f"{name}: joint fit", joint, "joint.json: ")
+            print_step(output, f"{name}: joint fit", joint, "joint.json")
     left_out = f"{outcome.reason_left_out}: the two-step procedure is skipped"
     output.print(two_step_line(two_step, joint) if two_step else left_out)
 

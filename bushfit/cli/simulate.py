@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from bushfit.caveat import Caveat
 from bushfit.cli.options import FILE, command_called, option, option_group
 from bushfit.cli.output import Output, with_output
 from bushfit.cli.shared_options import quantity
@@ -63,7 +64,8 @@ def command(source: Path, effects: tuple[str, ...], output: Output, **settings: 
     with error_location(source):
         result, document, files = simulate_campaign(truth, replace(tests, **changes), output.formats.table_form)
     if truth.unnamed:
-        output.warn(["the unnamed correction is left out, because it applies only to steady states, not in time"])
+        sentence = "the unnamed correction is left out, because it applies only to steady states, not in time"
+        output.warn([Caveat("correction_not_simulated", sentence)])
     output.print(result.model.equation())
     output.write(output.folder(result.name), files, document, [source])
 

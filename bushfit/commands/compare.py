@@ -7,6 +7,7 @@ from string import ascii_uppercase
 from typing import Any, Unpack
 
 from bushfit.campaign.campaign import Campaign
+from bushfit.caveat import Caveat
 from bushfit.commands.families import COMPOUND, family_to_use, fit_campaign_families
 from bushfit.commands.fit import fit
 from bushfit.commands.loading import HasResult, as_result
@@ -84,8 +85,8 @@ class ComparisonOutput:
     comparisons: Sequence[Comparison]
     advice: Sequence[str]
     words: Sequence[str]
-    notes: Sequence[str]
-    warnings: Sequence[str]
+    notes: Sequence[Caveat]
+    warnings: Sequence[Caveat]
     content: ComparisonFile
     document: Mapping[str, Any]
     files: Sequence[ResultFile]
@@ -120,7 +121,7 @@ def compare(
         BushfitError: too few or too many results, or directions and points that one of them cannot predict.
     """
     settings, directions = requested_settings(grid), grid.get("directions") or ()
-    fitted, notes = list[FittedFamily](), list[str]()
+    fitted, notes = list[FittedFamily](), list[Caveat]()
     if families is not None and isinstance(reference, Campaign) and not others:
         fitted, results, notes = fit_campaign_families(reference, families, directions or None)
         path, sweeps, sha256 = str(reference.path), reference.sweeps, reference.sha256
@@ -159,9 +160,10 @@ def compare(
         [_pair(label, comparison) for label, comparison in others_compared],
         [_family(*row) for row in zip(labels, fitted, results, strict=False)] or None,
         [*advice, *words],
-        warnings,
+        [warning.text for warning in warnings],
         command,
         {"bushfit": __version__, **versions()},
+        [warning.kind for warning in warnings],
     )
     document = to_json_data(content, ComparisonFile)
     figure = ResultFile("compare", "figure", lambda: plots.comparison.comparison_figure(content))
@@ -201,7 +203,7 @@ def compared_result(
 
 def _warnings(
     labels: Sequence[str], entries: Sequence[ComparedResult], comparisons: Sequence[Comparison], *, are_families: bool
-) -> list[str]:
+) -> list[Caveat]:
     """Warnings on results that share tests, then the warnings of each result with the letters of the results.
 
     Args:
@@ -211,27 +213,28 @@ def _warnings(
         are_families: True if the results are model families, which share their tests by design.
 
     Returns:
-        Sentences; a warning that several results have is one sentence, which starts with their letters.
+        Warnings; a warning that several results have is listed once, and starts with their letters.
     """
     shared = "intervals of their {} assume independent tests and are usually too wide"
     if are_families:
-        warnings = [
+        sentences = [
             f"families are fitted to the same tests: {shared.format('differences')}; compare families by their "
             "probability and held-out error"
         ]
     else:
-        warnings = [
+        sentences = [
             f"A and {label} were fitted to the same {', '.join(comparison.shared)}: {shared.format('difference')}"
             for label, comparison in zip(labels[1:], comparisons, strict=True)
             if comparison.shared
         ]
     predictions = [[pair.reference for comparison in comparisons for pair in comparison.contrasts]]
     predictions += [[pair.other for pair in comparison.contrasts] for comparison in comparisons]
-    labels_of: dict[str, list[str]] = {}
+    labels_of: dict[Caveat, list[str]] = {}
     for label, entry, predicted in zip(labels, entries, predictions, strict=True):
-        for line in warnings_of(entry.result, [prediction.warnings for prediction in predicted]):
-            labels_of.setdefault(line, []).append(label)
-    return [*warnings, *(f"{', '.join(of_line)}: {line}" for line, of_line in labels_of.items())]
+        for warning in warnings_of(entry.result, [prediction.warnings for prediction in predicted]):
+            labels_of.setdefault(warning, []).append(label)
+    warnings = [Caveat("shared_tests", sentence) for sentence in sentences]
+    return [*warnings, *(warning.about(", ".join(having)) for warning, having in labels_of.items())]
 
 
 def _common_places(results: Sequence[Result], names: Sequence[str] | None) -> list[list[Place]]:

@@ -124,7 +124,8 @@ def diagnose(
         diagnosis = _with_commands(diagnosis, path, command, can_plan=not (start or adopt))
     if not (diagnosis.changed or start or adopt):  # the model to use is that of fit
         plain = (joint or fit(data)).result
-        plain = replace(plain, warnings=tuple(line.removesuffix(NEXT) for line in plain.warnings))
+        warnings = (replace(warning, text=warning.text.removesuffix(NEXT)) for warning in plain.warnings)
+        plain = replace(plain, warnings=tuple(warnings))
         diagnosis = replace(diagnosis, result=diagnosis.odds.averaged(plain))
     document = diagnosis.to_document()
     origin = campaign_document(data, "diagnose", options)
@@ -197,5 +198,6 @@ def _with_commands(diagnosis: Diagnosis, path: str, command: str, *, can_plan: b
     def complete(text: str) -> str:
         return text.replace("bushfit diagnose CAMPAIGN", command).replace("CAMPAIGN", path)
 
-    result = replace(diagnosis.result, warnings=tuple(map(complete, diagnosis.result.warnings)))
+    warnings = (replace(warning, text=complete(warning.text)) for warning in diagnosis.result.warnings)
+    result = replace(diagnosis.result, warnings=tuple(warnings))
     return replace(diagnosis, next_test=complete(next_test), result=result)

@@ -10,6 +10,7 @@ import numpy as np
 from typing_extensions import TypedDict
 
 from bushfit.campaign.campaign import Campaign
+from bushfit.caveat import WarningEntries, to_entries
 from bushfit.commands.predict import GridOptions, predict
 from bushfit.export.contract import Exported, ExportRequest
 from bushfit.model.result import Result
@@ -42,7 +43,7 @@ class FormatEntry(TypedDict):
     left_out: list[str]
 
 
-class ExportDocument(TypedDict):
+class ExportDocument(WarningEntries):
     """Content of `export --json`.
 
     Args:
@@ -51,7 +52,6 @@ class ExportDocument(TypedDict):
     """
 
     formats: dict[str, FormatEntry]
-    warnings: list[str]
 
 
 def export(
@@ -90,7 +90,7 @@ def export(
             name: {"files": list(written.files), "left_out": list(written.omissions)}
             for name, written in exported.items()
         },
-        "warnings": predicted.warnings,
+        **to_entries(predicted.warnings),
     }
     contents = {name: content for written in exported.values() for name, content in written.files.items()}
     files = [ResultFile(name, "raw", content) for name, content in contents.items()]

@@ -7,6 +7,7 @@ from string import ascii_uppercase
 import numpy as np
 
 from bushfit.campaign.campaign import Campaign
+from bushfit.caveat import Caveat
 from bushfit.commands.fit import prepare_tests
 from bushfit.diagnosis.families import FittedFamily, fit_families
 from bushfit.diagnosis.fits import result_of
@@ -28,7 +29,7 @@ _BEYOND, _POINTS = 10.0, 400
 
 def fit_campaign_families(
     campaign: Campaign, names: Sequence[str], directions: Sequence[str] | None
-) -> tuple[list[FittedFamily], list[Result], list[str]]:
+) -> tuple[list[FittedFamily], list[Result], list[Caveat]]:
     """Fit model families (sets of effects) to a campaign: the model of [fit], then the named families.
 
     Args:
@@ -37,7 +38,7 @@ def fit_campaign_families(
         directions: directions or specimens whose tests are fitted; None for the default.
 
     Returns:
-        The fitted families, their results in the same order, and notes.
+        The fitted families, their results in the same order, and warnings.
     """
     data = prepare_tests(campaign)
     data_sets = [data_set.with_weight() for data_set in data.select_tests(directions or None)]
@@ -47,12 +48,14 @@ def fit_campaign_families(
     adjusted = iter(holm([family.p for family in families if family.p is not None]))
     families = [family if family.p is None else replace(family, p=next(adjusted)) for family in families]
     results = [result_of(family.fit, data.bounds, model.effects, rig=campaign.rig) for family in families]
-    notes = list[str]()
+    notes = list[Caveat]()
     if results[0].model_error is None:
-        notes.append("the first family meets these tests within their noise: the tests need no other family")
+        sentence = "the first family meets these tests within their noise: the tests need no other family"
+        notes.append(Caveat("first_family_enough", sentence))
     if unlikely:
         percent = number(100.0 * sum(unlikely.values()), 2)
-        notes.append(f"{len(unlikely)} more families have a probability of {percent} % together: {', '.join(unlikely)}")
+        sentence = f"{len(unlikely)} more families have a probability of {percent} % together: {', '.join(unlikely)}"
+        notes.append(Caveat("unlikely_families", sentence))
     return families, [replace(result, specimens=campaign.specimens) for result in results], notes
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import PredictSettings
 from bushfit.campaign.session import measured_session
+from bushfit.caveat import Caveat
 from bushfit.commands.loading import HasResult, as_result
 from bushfit.commands.predicted import PredictionOutput, prediction_files
 from bushfit.effects import Level
@@ -68,7 +69,7 @@ def predict(
     static: bool = False,
     static_rates: Mapping[str, float] | None = None,
     over: LargeMotion | None = None,
-    notes: Sequence[str] = (),
+    notes: Sequence[Caveat] = (),
     **grid: Unpack[GridOptions],
 ) -> PredictionOutput:
     """Predict stiffness and loss factor over a grid, with 95 % bands.
@@ -172,23 +173,24 @@ def predict(
                 place="--arms",
                 expected="a model with frequency-dependent stiffness, for example with a springpot",
             )
-    notes = (*notes, *(f"{sweep.name}: {note}" for sweep in measured for note in sweep.notes))
+    notes = (*notes, *(note.about(sweep.name) for sweep in measured for note in sweep.notes))
     output = PredictionOutput(result, predictions, measured, notes, resonances, maxwell, curves)
     return replace(output, files=prediction_files(output, wide=wide))
 
 
-def _assign_bushing(campaign: Campaign, result: Result) -> tuple[Campaign, list[str]]:
+def _assign_bushing(campaign: Campaign, result: Result) -> tuple[Campaign, list[Caveat]]:
     """Assign the tests of a campaign to a fitted bushing with the same geometry, if several bushings were fitted.
 
     Returns:
-        The campaign, and a note if it tests another shape than that of a single fitted bushing.
+        The campaign, and a warning if it tests another shape than that of a single fitted bushing.
     """
     bushing, fitted = campaign.bushing, result.bushings
     if bushing and result.model.bushing and not fitted:
         both = bushing, result.model.bushing
         sizes, fitted_sizes = ((body.inner_radius, body.outer_radius, body.length) for body in both)
-        note = f"{result.name}: {campaign.path.name} tests a bushing of another shape, {bushing.name}"
-        note += f"; --bushing {campaign.path.name} predicts that shape"
+        sentence = f"{campaign.path.name} tests a bushing of another shape, {bushing.name}"
+        sentence += f"; --bushing {campaign.path.name} predicts that shape"
+        note = Caveat("other_shape_tested", sentence).about(result.name)
         return campaign, [] if np.allclose(sizes, fitted_sizes, atol=0.0) else [note]
     bodies = [body for body in fitted if bushing and replace(bushing, name=body.name) == body]
     listed = {place.bushing for place in campaign.specimens if place.bushing}

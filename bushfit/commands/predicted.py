@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import pandas as pd
 
+from bushfit.caveat import Caveat, to_entries
 from bushfit.fitting.agreement import expected_errors, misfits
 from bushfit.fitting.preparation import MeasuredSweep
 from bushfit.geometry import Direction
@@ -27,7 +28,7 @@ from bushfit.report.tables import prediction_table
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-#: Content of `predict --json`: columns of each table by header, null in an empty cell; and warnings.
+#: Content of `predict --json`: columns of each table by header, null in an empty cell; warnings and their kinds.
 PredictionDocument = dict[str, dict[str, list[float | None]] | list[str]]
 #: A prediction or a static curve.
 Part = TypeVar("Part", Prediction, StaticCurve)
@@ -51,7 +52,7 @@ class PredictionOutput:
     result: Result
     predictions: Sequence[Prediction]
     measured: Sequence[MeasuredSweep] = ()
-    notes: Sequence[str] = ()
+    notes: Sequence[Caveat] = ()
     resonances: Sequence[PredictedResonance] = ()
     arms: Sequence[Arms] = ()
     static: Sequence[StaticCurve] = ()
@@ -83,10 +84,10 @@ class PredictionOutput:
                 }
                 for arms in self.arms
             ]
-        return {**document, "warnings": self.warnings}
+        return {**document, **to_entries(self.warnings)}
 
     @property
-    def warnings(self) -> list[str]:
+    def warnings(self) -> list[Caveat]:
         """Warnings of the model, of each prediction, static curve and resonance, without repetition."""
         predicted = [prediction.warnings for prediction in self.predictions]
         predicted += [curve.warnings for curve in self.static]

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from bushfit.campaign.campaign import Campaign
+from bushfit.caveat import to_entries
 from bushfit.errors import quote_path
 from bushfit.fitting.preparation import MeasuredSweep, MeasuredTest
 from bushfit.fitting.prepared_campaign import PreparedCampaign
@@ -17,7 +18,7 @@ from bushfit.reading.measurement import Loop, Sweep
 
 def result_document(result: Result, campaign: Mapping[str, Any]) -> dict[str, Any]:
     """Content of a model file: the result, its warnings, and its campaign as `campaign_document` describes it."""
-    return {**to_document(result), "warnings": warnings_of(result), "campaign": campaign}
+    return {**to_document(result), **to_entries(warnings_of(result)), "campaign": campaign}
 
 
 def campaign_document(data: PreparedCampaign, command: str, options: Iterable[str] = ()) -> dict[str, Any]:

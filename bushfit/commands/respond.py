@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from typing_extensions import TypedDict
 
+from bushfit.caveat import Caveat, WarningEntries, to_entries
 from bushfit.commands.loading import HasResult, as_result
 from bushfit.effects.contract import Array
 from bushfit.effects.history import History
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-class ResponseDocument(TypedDict):
+class ResponseDocument(WarningEntries):
     """Peak force, energy and other values of the force over time, by direction, printed by `bushfit respond --json`.
 
     Args:
@@ -41,7 +41,6 @@ class ResponseDocument(TypedDict):
     """
 
     directions: dict[str, dict[str, float | None]]
-    warnings: list[str]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -60,7 +59,7 @@ class ResponseOutput:
     result: Result
     time: Array
     responses: Sequence[TimeResponse]
-    warnings: Sequence[str]
+    warnings: Sequence[Caveat]
     document: Mapping[str, Any]
     files: Sequence[ResultFile]
 
@@ -127,20 +126,23 @@ def respond(
     ]
     notes = dict.fromkeys(note for channel in prepared for note in channel.notes)
     warnings = warnings_of(result, [response.warnings for response in responses], [*notes])
-    figures = {str(response.direction): response_figures(response) for response in responses}
+    document: ResponseDocument = {
+        "directions": {str(response.direction): response_figures(response) for response in responses},
+        **to_entries(warnings),
+    }
     title, time = f"{result.name}: force over time", prepared[0].time
     table = ResultFile("response", "table", partial(response_table, time, responses))
     files = [table, ResultFile("response", "figure", partial(draw_response, title, table, warnings))]
-    return ResponseOutput(result, time, responses, warnings, {"directions": figures, "warnings": warnings}, files)
+    return ResponseOutput(result, time, responses, warnings, document, files)
 
 
-def draw_response(title: str, table: ResultFile, warnings: Sequence[str] = ()) -> Figure:
+def draw_response(title: str, table: ResultFile, warnings: Sequence[Caveat] = ()) -> Figure:
     """Draw the force over time in a table of `respond`, or of a validation record, with warnings below the figure.
 
     Args:
         title: title of the figure.
         table: result file with the table.
-        warnings: sentences to print below the figure.
+        warnings: warnings to print below the figure.
     """
     return plots.response.response_figure(title, table.content(), plots.style.warnings_note(warnings))
 

@@ -6,10 +6,10 @@ from functools import partial
 from typing import Annotated, Any, Required
 
 from pydantic import Field
-from typing_extensions import TypedDict
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import Loss
+from bushfit.caveat import WarningEntries, to_entries
 from bushfit.commands.diagnose import DiagnosisOutput, diagnose
 from bushfit.commands.fit import FitOutput, campaign_files, fit, fit_static, prepare_tests
 from bushfit.commands.predict import predict
@@ -28,7 +28,7 @@ from bushfit.report.page.report import report_page
 from bushfit.report.results import ResultFile
 
 
-class RunDocument(TypedDict, total=False):
+class RunDocument(WarningEntries, total=False):
     """JSON documents of all steps (fits, diagnosis), as `bushfit run --json` prints them.
 
     Args:
@@ -46,7 +46,6 @@ class RunDocument(TypedDict, total=False):
         Annotated[ModelFile, Field(description="Model to use: the joint fit, or the model with the effects added.")]
     ]
     diagnosis: DiagnosisFile
-    warnings: list[str]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -131,7 +130,7 @@ def run(campaign: Campaign | PreparedCampaign, *, loss: Loss | None = None) -> R
         validations = validate(predicted.result, data.campaign.validation)
         files += validation_files(validations, (), data.campaign.name)
     files.append(ResultFile("report", "page", partial(report_page, files)))
-    document = {**documents, "warnings": predicted.warnings}
+    document = {**documents, **to_entries(predicted.warnings)}
     return RunOutput(data, static, two_step, reason, joint, diagnosed, predicted, document, files, validations)
 
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from bushfit.caveat import Caveat
 from bushfit.effects import BASE
 from bushfit.effects.contract import Array
 from bushfit.effects.mistakes import MISTAKES, Mistake, file_or_name, get_mistake, labelled
@@ -113,7 +114,7 @@ class Claim:
         return data.with_rubber_conditions()
 
 
-def correct_adopted(data: PreparedCampaign, names: Collection[str]) -> tuple[PreparedCampaign, list[str]]:
+def correct_adopted(data: PreparedCampaign, names: Collection[str]) -> tuple[PreparedCampaign, list[Caveat]]:
     """Correct the recording mistakes that the user confirms with the option --adopt.
 
     Args:
@@ -121,7 +122,7 @@ def correct_adopted(data: PreparedCampaign, names: Collection[str]) -> tuple[Pre
         names: values of --adopt, "mistake:test" or "mistake".
 
     Returns:
-        The corrected campaign, and one sentence for each mistake.
+        The corrected campaign, and one warning for each mistake.
 
     Raises:
         ModelError: the named mistake is not possible in this test, or the campaign has no such test.
@@ -137,7 +138,8 @@ def correct_adopted(data: PreparedCampaign, names: Collection[str]) -> tuple[Pre
                 found=name,
                 expected=f"one of {expected}" if expected else "another mistake: this one is not possible in any test",
             )
-        messages.append(f"corrected by --adopt {name}: read as if {claim.sentence}; {claim.corrections[0]}")
+        sentence = f"read as if {claim.sentence}; {claim.corrections[0]}"
+        messages.append(Caveat("corrected_record", sentence).about(f"corrected by --adopt {name}"))
         data = claim.corrected()
     return data, messages
 

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from bushfit.campaign.schema import RigSettings
+from bushfit.caveat import Caveat
 from bushfit.effects.contract import Array, RubberConditions
 from bushfit.fitting.noise import LineKey, SweepNoise, sweep_noise
 from bushfit.fitting.preparation import MeasuredLoop, MeasuredSweep, repeats_of, with_gain_errors
@@ -44,7 +45,7 @@ class _ShortSweep(NamedTuple):
     sentence: str
 
 
-def shorten_tests(data: PreparedCampaign) -> tuple[PreparedCampaign, tuple[str, ...]]:
+def shorten_tests(data: PreparedCampaign) -> tuple[PreparedCampaign, tuple[Caveat, ...]]:
     """Reduce long sweeps and many loops of a campaign to fewer points, so that a diagnosis takes less time.
 
     Long runs of sweeps become means over narrow bands. If a sweep has very many levels, or the loops very many rows, a
@@ -55,15 +56,14 @@ def shorten_tests(data: PreparedCampaign) -> tuple[PreparedCampaign, tuple[str, 
         data: the campaign.
 
     Returns:
-        The reduced campaign, and a sentence on the loops and on each sweep that is changed.
+        The reduced campaign, and a warning on the loops and on each sweep that is changed.
     """
-    rig, loops, messages = data.campaign.rig, _select_loops(data.loops), tuple[str, ...]()
+    rig, loops, messages = data.campaign.rig, _select_loops(data.loops), tuple[Caveat, ...]()
     if len(loops) < len(data.loops):
         data, total = replace(data, loops=tuple(with_gain_errors(loops, rig))), len(data.loops)
-        messages = (
-            f"the diagnosis uses {len(loops)} of the {total} loops, because all loops together have more than "
-            f"{_MOST_ROWS} rows",
-        )
+        sentence = f"the diagnosis uses {len(loops)} of the {total} loops"
+        reason = f"because all loops together have more than {_MOST_ROWS} rows"
+        messages = (Caveat("fewer_loops", f"{sentence}, {reason}"),)
     shortened = {data_set: short for data_set in data.sweeps if (short := _shorten_sweep(data_set))}
     if not shortened:
         return data, messages
@@ -78,7 +78,7 @@ def shorten_tests(data: PreparedCampaign) -> tuple[PreparedCampaign, tuple[str, 
             weight = np.full(short.sweep.frequency.size, data_set.test.weight)
             new = replace(new, test=short.sweep, weights=weight, test_conditions=short.conditions)
         sweeps.append(new)
-    messages += tuple(f"{short.sweep.name}: {short.sentence}" for short in shortened.values())
+    messages += tuple(Caveat("fewer_points", short.sentence).about(short.sweep.name) for short in shortened.values())
     return replace(data, sweeps=tuple(sweeps)), messages
 
 

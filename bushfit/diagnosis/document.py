@@ -205,6 +205,7 @@ class DiagnosisFile(TypedDict):
         usable: expected error of model.json; null for fewer than five fitted points.
         next_test: test that would decide between the explanations or confirm the verdict; empty without one.
         warnings: warnings on the tests, the fit and the model to use.
+        warning_kinds: kind of each warning, as in bushfit/caveat.toml; missing in older files.
     """
 
     schema: Literal["bushfit/diagnosis/3"]
@@ -221,3 +222,4 @@ class DiagnosisFile(TypedDict):
     usable: ExpectedErrorEntry | None
     next_test: str
     warnings: list[str]
+    warning_kinds: NotRequired[list[str]]

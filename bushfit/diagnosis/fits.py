@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from bushfit.campaign.schema import UNSTATED, RigSettings
+from bushfit.caveat import Caveat
 from bushfit.effects import qualified_name
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError, ModelError
@@ -35,9 +36,10 @@ _MOST_FALL = 4.0
 #: Number of model evaluations before which no refit is abandoned: parameters that the gap has distorted recover slowly.
 _FIRST = 16
 #: Warning for a model with a smooth correction.
-_CORRECTED = (
+_CORRECTED = Caveat(
+    "gap_in_parameters",
     "a smooth correction closes a gap that no effect explains: "
-    "the parameters and their intervals contain a part of this gap"
+    "the parameters and their intervals contain a part of this gap",
 )
 
 
@@ -163,7 +165,7 @@ def result_of(
         tests = with_level_errors(fit.problem.tests, errors.error, errors.freedom)
         return Descent.start(replace(fit.problem, model=fit.model, tests=tests)).run(EVALUATIONS).solution
 
-    closest, error, misses = fit, None, list[str]()
+    closest, error, misses = fit, None, list[Caveat]()
     if corrected:
         closest, misses = replace(corrected, noise_weighted=fit.data_sets), [_CORRECTED]
     elif lacking:

@@ -6,6 +6,7 @@ from typing import Any, cast
 
 import numpy as np
 
+from bushfit.caveat import Caveat
 from bushfit.diagnosis.document import (
     Description,
     DiagnosisFile,
@@ -184,7 +185,7 @@ class Diagnosis:
         before: starting model, refitted to all tests.
         after: model with the added effects; for a recording mistake, fitted to the corrected tests.
         result: model to use, with its uncertainty: `after`, or `before` for a recording mistake.
-        notes: warnings as sentences.
+        notes: further warnings.
         description: power law of a gap that no known effect explains; None without such a gap or law.
         odds: reported explanations with their probabilities.
     """
@@ -200,7 +201,7 @@ class Diagnosis:
     before: FitResult
     after: FitResult
     result: Result
-    notes: tuple[str, ...] = ()
+    notes: tuple[Caveat, ...] = ()
     description: Description | None = None
     odds: Odds = Odds(1.0)
 
@@ -218,6 +219,11 @@ class Diagnosis:
     def calibration(self) -> tuple[float, float]:
         """Root mean square of the fitted residuals before and after the diagnosis, in units of noise."""
         return self.before.mean_square**0.5, self.after.mean_square**0.5
+
+    @property
+    def warnings(self) -> list[Caveat]:
+        """Notes of the diagnosis, and warnings of the model to use."""
+        return warnings_of(self.result, notes=self.notes)
 
     def to_document(self) -> DiagnosisFile:
         """Convert the diagnosis to the content of diagnosis.json.
@@ -253,7 +259,8 @@ class Diagnosis:
             "gap": gap,
             "usable": usable,
             "next_test": self.next_test,
-            "warnings": warnings_of(self.result, notes=self.notes),
+            "warnings": [warning.text for warning in self.warnings],
+            "warning_kinds": [warning.kind for warning in self.warnings],
         }
         return to_json_data(document, DiagnosisFile)
 

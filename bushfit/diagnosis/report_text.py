@@ -11,6 +11,7 @@ from functools import reduce
 
 import numpy as np
 
+from bushfit.caveat import Caveat
 from bushfit.diagnosis.described import GapDescription, describe
 from bushfit.diagnosis.document import Verdict
 from bushfit.diagnosis.explanation_text import (
@@ -43,9 +44,10 @@ from bushfit.units import number
 
 #: Summary if there is no gap; and note on tests of one direction.
 _NOTHING = "the tests show no missing effect beyond noise and tolerance"
-_ONE_DIRECTION = (
+_ONE_DIRECTION = Caveat(
+    "one_direction",
     "one direction was tested: a deviation of the compound and a smooth fault of the rig cannot be distinguished; test "
-    "another direction or specimen"
+    "another direction or specimen",
 )
 #: Advice if levels disagree by more than the class of the rig.
 _LEVELS_ADVICE = "measure the levels again in another session, or state the class of the rig (gain_error under [rig])"
@@ -222,8 +224,9 @@ class DiagnosisWriter:
         after = self._with_free_gains(best.state.plain)
         closing = Closing(base, holdout=hold_out(base, after, self.search.data.bounds))
         diagnosis = self._build(closing, summary, self._record_entries(first), places=best, next_test=advice)
-        warning = f"fitted to the tests as they are, which only agree if {claim.sentence}: {advice}"
-        result = replace(diagnosis.result, warnings=(*diagnosis.result.warnings, warning))
+        sentence = f"fitted to the tests as they are, which only agree if {claim.sentence}: {advice}"
+        warnings = (*diagnosis.result.warnings, Caveat("mistaken_record", sentence))
+        result = replace(diagnosis.result, warnings=warnings)
         return replace(diagnosis, after=after, remainder=find_regions(after), result=result)
 
     def _undecided_diagnosis(self, first: Composition, closing: Closing) -> Diagnosis:
@@ -380,11 +383,12 @@ class DiagnosisWriter:
             odds,
         )
 
-    def _notes(self) -> list[str]:
-        """Sentences on the effects and kinds of fault that these tests cannot show."""
+    def _notes(self) -> list[Caveat]:
+        """Warnings on the effects and kinds of fault that these tests cannot show."""
         unseen = [proposal.name for proposal in self.search.proposals if not proposal.visible]
         unseen = [name for name in unseen if not get_effect(name).depends_on]  # not those that need a stated condition
-        notes = [f"not identifiable from these tests: {', '.join(unseen)}"] if unseen else []
+        sentence = f"not identifiable from these tests: {', '.join(unseen)}"
+        notes = [Caveat("effects_not_visible", sentence)] if unseen else []
         directions = {str(test.direction) for test in self.search.base.data_sets}
         return [*notes, *([_ONE_DIRECTION] if self.first and self.first.unnamed and len(directions) == 1 else [])]
 

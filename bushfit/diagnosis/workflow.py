@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
+from bushfit.caveat import Caveat
 from bushfit.diagnosis.claims import ClaimScreening, claims, correct_adopted
 from bushfit.diagnosis.condense import shorten_tests
 from bushfit.diagnosis.faulty_parts import outlier_clusters
@@ -84,10 +85,8 @@ def diagnose(
     pairs = zip(whole.sweeps, data.sweeps, strict=True)
     reduced = {after.name for before, after in pairs if after.size < before.size}
     counts = Counter(outlier.test for outlier in outliers if outlier.test in reduced)
-    left_out = (
-        f"{name}: {count} of these points are left out, because they deviate by more than noise"
-        for name, count in counts.items()
-    )
+    deviating = "of these points are left out, because they deviate by more than noise"
+    left_out = (Caveat("outlying_means", f"{count} {deviating}").about(name) for name, count in counts.items())
     of_loops = list_outliers(diagnosis.result.model, data.loops)
     warnings = (*outlier_warnings(of_loops, robust=data.robust), *outlier_warnings(excluded, robust=True))
     notes = (*messages, *reductions, *left_out, *diagnosis.notes, *data.assumptions, *warnings)

@@ -10,6 +10,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from bushfit.caveat import Caveat
 from bushfit.effects import unnamed
 from bushfit.effects.contract import Branch as Branch
 from bushfit.effects.contract import Effect as Effect
@@ -66,6 +67,8 @@ def _build(name: str, entry: dict[str, Any], module: ModuleType) -> Effect | Fam
         Parameter(key, **{"neutral": None, **table, "bounds": tuple(table["bounds"])})
         for key, table in entry.pop("parameters").items()
     ]
+    if "assumption" in entry:
+        entry["assumption"] = Caveat(**entry["assumption"])
     if "level" in entry:
         entry["level"] = Level[entry["level"].upper()]
     radial, places = entry.pop("radial", {}), _SOUGHT[entry.pop("sought", "others")]

@@ -27,6 +27,7 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 import numpy as np
 
+from bushfit.caveat import Caveat
 from bushfit.effects.history import Array as Array
 from bushfit.effects.history import History as History
 from bushfit.geometry import STRAINING, Bushing, Direction, Place
@@ -202,7 +203,7 @@ class Effect:
             the twins, is proposed; the tests determine its size but cannot distinguish it from its twins.
         replaces: name of the paper's branch that the effect replaces; None if the effect is added.
         depends_on: names of the `RubberConditions` on which the effect depends.
-        assumption: sentence on the value of these quantities in a prediction; empty for effects of the rig.
+        assumption: warning on the value of these quantities in a prediction; None for effects of the rig.
         in_place_of: function that converts the values of the replaced branch to start values for a fit, the most
             probable first; None if the effect replaces no branch.
         harmonic_only: True if the effect has no equation in time: in loops it contributes to the first harmonic alone
@@ -227,7 +228,7 @@ class Effect:
     depends_on: tuple[
         Literal["temperature", "session_time", "largest_strain", "previous_strain", "rest_time", "preload"], ...
     ] = ()
-    assumption: str = ""
+    assumption: Caveat | None = None
     harmonic_only: bool = False
     in_place_of: Callable[[Values], list[dict[str, float]]] | None = None
     after: str | None = None

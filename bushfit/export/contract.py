@@ -169,7 +169,7 @@ class ExportRequest:
                 yield "valid", ", ".join(parts)
         yield from (("limit", omission) for omission in omissions)
         warnings = warnings_of(self.result, [prediction.warnings for prediction in self.predictions])
-        yield from (("warning", line) for line in warnings)
+        yield from (("warning", warning.text) for warning in warnings)
 
     @property
     def conditions(self) -> RubberConditions:

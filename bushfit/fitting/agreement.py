@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from bushfit.caveat import Caveat
 from bushfit.effects.contract import Array
 from bushfit.fitting.coordinates import Coordinates, coordinate_changes, prior_covariance
 from bushfit.fitting.preparation import MeasuredSweep, MeasuredTest, log_slopes, residual_slices
@@ -256,11 +257,14 @@ def prior_uses(solution: FitResult, covariance: Covariance) -> dict[str, PriorUs
     return uses
 
 
-def prior_warnings(uses: Mapping[str, PriorUse]) -> list[str]:
-    """Warnings about priors that the tests contradict, one sentence each."""
+def prior_warnings(uses: Mapping[str, PriorUse]) -> list[Caveat]:
+    """Warnings about priors that the tests contradict, one for each prior."""
     return [
-        f"the tests contradict the prior of {name} ({use.source}) by {number(abs(use.distance), 2)} standard "
-        "deviations (95 % of correct priors: at most 1.96). Check the prior, or leave it out"
+        Caveat(
+            "prior_contradicted",
+            f"the tests contradict the prior of {name} ({use.source}) by {number(abs(use.distance), 2)} standard "
+            "deviations (95 % of correct priors: at most 1.96). Check the prior, or leave it out",
+        )
         for name, use in uses.items()
         if abs(use.distance) > Z95
     ]

@@ -9,6 +9,7 @@ from collections.abc import Hashable, Sequence
 
 import numpy as np
 
+from bushfit.caveat import Caveat
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError
 from bushfit.fitting.coordinates import Coordinates
@@ -199,7 +200,7 @@ def excess_chi_square(chi_square: float, freedom: int) -> float | None:
     return chi_square if chi_square > 1.0 + _LACK_OF_FIT * np.sqrt(2.0 / freedom) else None
 
 
-def misfit_warnings(model: Model, data_sets: Sequence[MeasuredTest], parameters: int, advice: str = "") -> list[str]:
+def misfit_warnings(model: Model, data_sets: Sequence[MeasuredTest], parameters: int, advice: str = "") -> list[Caveat]:
     """Warning that the model misses all tests together, or one test, by more than the noise.
 
     Args:
@@ -209,7 +210,7 @@ def misfit_warnings(model: Model, data_sets: Sequence[MeasuredTest], parameters:
         advice: text to append to the sentence.
 
     Returns:
-        List with the sentence; empty if the model fits.
+        List with the warning; empty if the model fits.
     """
     chi_square, freedom = reduced_chi_square(model, data_sets, parameters)
     by_test = {test.name: lack for test in data_sets if (lack := lack_of_fit(model, [test], 0)) is not None}
@@ -217,10 +218,11 @@ def misfit_warnings(model: Model, data_sets: Sequence[MeasuredTest], parameters:
         return []
     worst = max(by_test, key=lambda name: by_test[name], default="")
     in_worst = f", {number(by_test[worst], 2)} in {worst}" if len(data_sets) > 1 and worst else ""
-    return [
+    sentence = (
         f"the model misses the data by more than their noise (reduced chi-square {number(chi_square, 2)}{in_worst}): "
         f"intervals are invalid, though standard errors are scaled up{advice}"
-    ]
+    )
+    return [Caveat("misfit", sentence)]
 
 
 def quality(model: Model, data_sets: Sequence[MeasuredTest], parameters: int) -> Quality:
@@ -278,11 +280,11 @@ def preload_ranges(data_sets: Sequence[MeasuredTest]) -> list[PreloadRange]:
     return ranges
 
 
-def implausible_modulus(bushing: Bushing | None, data_sets: Sequence[MeasuredTest]) -> list[str]:
+def implausible_modulus(bushing: Bushing | None, data_sets: Sequence[MeasuredTest]) -> list[Caveat]:
     """Warning about shear moduli that no rubber has or that differ too much between tests, usually due to a wrong unit.
 
     Returns:
-        At most one sentence.
+        At most one warning.
     """
     moduli = {
         data_set.name: float(np.median(np.abs(data_set.measured))) / stiffness_per_modulus(bushing, data_set.direction)
@@ -291,9 +293,10 @@ def implausible_modulus(bushing: Bushing | None, data_sets: Sequence[MeasuredTes
     softest, hardest = (pick(moduli, key=moduli.__getitem__) for pick in (min, max))
     ratio = moduli[hardest] / moduli[softest]
     if ratio > _MOST_STIFFENING:
-        return [f"{hardest} shows {number(ratio, 2)} times the modulus of {softest}, impossible for rubber: {_CHECK}"]
+        sentence = f"{hardest} shows {number(ratio, 2)} times the modulus of {softest}, impossible for rubber: {_CHECK}"
+        return [Caveat("implausible_modulus", sentence)]
     sentence = f"{hardest}: a shear modulus of {format_range('Pa', moduli[hardest])} is impossible for rubber: {_CHECK}"
-    return [] if _SOFTEST < moduli[hardest] < _HARDEST else [sentence]
+    return [] if _SOFTEST < moduli[hardest] < _HARDEST else [Caveat("implausible_modulus", sentence)]
 
 
 def check_strain(bushing: Bushing | None, data_sets: Sequence[MeasuredTest]) -> None:
@@ -311,11 +314,11 @@ def check_strain(bushing: Bushing | None, data_sets: Sequence[MeasuredTest]) -> 
             )
 
 
-def temperature_warning(model: Model, data_sets: Sequence[MeasuredTest]) -> list[str]:
+def temperature_warning(model: Model, data_sets: Sequence[MeasuredTest]) -> list[Caveat]:
     """Warning about tests whose temperatures are too different for one model.
 
     Returns:
-        At most one sentence.
+        At most one warning.
     """
     degrees = [(data_set.name, data_set.test.temperature) for data_set in data_sets]
     temperatures = sorted((float(np.mean(kelvin)) - CELSIUS, name) for name, kelvin in degrees if kelvin is not None)
@@ -325,22 +328,23 @@ def temperature_warning(model: Model, data_sets: Sequence[MeasuredTest]) -> list
     if high - low <= _ONE_TEMPERATURE:
         return []
     tested = f"{warmest} was tested at {number(high, 3)} degC and {coldest} at {number(low, 3)} degC"
-    return [
+    sentence = (
         f"{tested}, {number(high - low, 3)} degC apart. This model has no effect of temperature, so another "
         "effect may absorb the difference: fit each temperature separately, or use --effect temperature"
-    ]
+    )
+    return [Caveat("temperatures_differ", sentence)]
 
 
-def mixed_condition_warnings(data_sets: Sequence[MeasuredTest]) -> list[str]:
+def mixed_condition_warnings(data_sets: Sequence[MeasuredTest]) -> list[Caveat]:
     """Warnings about tests of one bushing made on several specimens or under several preloads.
 
     Args:
         data_sets: tests of a campaign.
 
     Returns:
-        One sentence for each condition that differs.
+        One warning for each condition that differs.
     """
-    sentences = []
+    warnings = []
     labels = {"specimen_number": "of specimens", "preload": "under preloads of"}
     if preload_ranges(data_sets):  # a variable of the model, or without influence
         del labels["preload"]
@@ -352,13 +356,12 @@ def mixed_condition_warnings(data_sets: Sequence[MeasuredTest]) -> list[str]:
                 by_value.setdefault(str(conditions[key]), data_set.name)
         if len(by_value) > 1:
             listed = ", ".join(f"{value} ({name})" for value, name in by_value.items())
-            sentences.append(
-                f"the tests are {words} {listed}, and one model is fitted to all: fit each group in a separate campaign"
-            )
-    return sentences
+            sentence = f"the tests are {words} {listed}, and one model is fitted to all"
+            warnings.append(Caveat("mixed_conditions", f"{sentence}: fit each group in a separate campaign"))
+    return warnings
 
 
-def unfitted_warnings(model: Model, data_sets: Sequence[MeasuredTest], advice: str) -> list[str]:
+def unfitted_warnings(model: Model, data_sets: Sequence[MeasuredTest], advice: str) -> list[Caveat]:
     """Warnings about tests that a model was not fitted to and misses by more than their noise, one for each direction.
 
     Args:
@@ -367,9 +370,9 @@ def unfitted_warnings(model: Model, data_sets: Sequence[MeasuredTest], advice: s
         advice: text to append to each sentence.
 
     Returns:
-        Sentences; empty if the model predicts all these tests within their noise.
+        Warnings; empty if the model predicts all these tests within their noise.
     """
-    misses, sentences = dict[str, list[tuple[float, float, str]]](), []
+    misses, warnings = dict[str, list[tuple[float, float, str]]](), []
     for test in data_sets:
         if (chi_square := lack_of_fit(model, [test], 0)) is not None:
             share = 100.0 * float(np.sqrt(np.mean(np.square(test.relative(model)))))
@@ -381,5 +384,6 @@ def unfitted_warnings(model: Model, data_sets: Sequence[MeasuredTest], advice: s
             smallest, largest = (number(end(share for _, share, _ in found), 2) for end in (min, max))
             missed = f"were not fitted, and the model misses them by {smallest} to {largest} % (NRMSE), {worst} by"
         subject = f"{worst}, {place}," if len(found) == 1 else f"{len(found)} tests, {place},"
-        sentences.append(f"{subject} {missed} {number(noises, 2)} times its noise{advice}")
-    return sentences
+        sentence = f"{subject} {missed} {number(noises, 2)} times its noise{advice}"
+        warnings.append(Caveat("unfitted_test_missed", sentence))
+    return warnings

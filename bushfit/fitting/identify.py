@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from bushfit.caveat import Caveat
 from bushfit.effects import effect_name_of
 from bushfit.effects.contract import Array
 from bushfit.fitting.assess import measured_range
@@ -85,7 +86,7 @@ _COMBINATIONS = (
 
 def undetermined_parameters(
     model: Model, data_sets: Sequence[MeasuredTest], names: Sequence[str], covariance: Covariance
-) -> list[str]:
+) -> list[Caveat]:
     """Warnings about parameters of a fitted model that the tests do not determine; none if all are determined.
 
     There is one sentence, with standard errors, for each group of parameters whose errors are correlated.
@@ -97,14 +98,14 @@ def undetermined_parameters(
         covariance: covariance of the fitted parameters.
 
     Returns:
-        Sentences; empty if the tests determine every parameter.
+        Warnings; empty if the tests determine every parameter.
     """
     if not names:
         return []
     _, slopes = FitProblem(model, data_sets, names).linearise(model)
     slopes = slopes[:, : sum(test.size for test in data_sets)] * relative_sizes(model, names)[:, None]
     directions = _error_directions(slopes)
-    groups, lines = _groups(names, directions), list[str]()
+    groups, lines = _groups(names, directions), list[Caveat]()
     changes = np.abs(Coordinates.of_parameters(model, names).slopes(model.values) * relative_sizes(model, names))
     stderr = {name: covariance.stderr(name) or 0.0 for name in names}
     errors = {name: stderr[name] / float(change) for name, change in zip(names, changes, strict=True)}
@@ -118,7 +119,7 @@ def undetermined_parameters(
         for name in zero:
             effect = effect_name_of(name)
             remark = f": these tests do not show {effect}" * (effect in unseen)
-            lines.append(f"{name} does not differ from {neutral[name]:g}{remark}")
+            lines.append(Caveat("no_difference", f"{name} does not differ from {neutral[name]:g}{remark}"))
         is_shown = [name not in zero and effect_name_of(name) not in unseen for name in names]
         names = [name for name, keep in zip(names, is_shown, strict=True) if keep]
         if not names:
@@ -136,13 +137,15 @@ def undetermined_parameters(
             meaning = "sigma_fmax and eps_half are determined only as a ratio"
         elif len(group) == 1:
             meaning = f"{group[0]} is not determined"
-        lines.append(f"{reasons}: {meaning} (standard errors: {listed})")
+        lines.append(Caveat("undetermined", f"{reasons}: {meaning} (standard errors: {listed})"))
         combinations |= dict.fromkeys(_known_combinations(model, data_sets, rows, group))
     if combinations:
-        lines.append("combinations that the tests determine: " + "; ".join(combinations))
+        sentence = "combinations that the tests determine: " + "; ".join(combinations)
+        lines.append(Caveat("known_combinations", sentence))
     # what another test would tell beside an error of the model depends on what that error is
     missed = any(data_set.model_error for data_set in data_sets)
-    return lines if missed else [*lines, "bushfit plan chooses further tests that determine these parameters"]
+    advice = Caveat("determined_by_plan", "bushfit plan chooses further tests that determine these parameters")
+    return lines if missed else [*lines, advice]
 
 
 def _percent(error: float) -> str:

@@ -8,6 +8,7 @@ from typing import Self
 
 import numpy as np
 
+from bushfit.caveat import Caveat
 from bushfit.effects.contract import Array, RubberConditions, Values
 from bushfit.effects.history import History
 from bushfit.fitting.loop_harmonics import GRID, SMOOTH_HARMONICS, OutlierRows, driving_motion
@@ -47,7 +48,7 @@ class MeasuredLoop(MeasuredBase):
             motion is not about zero or starts from rest at another position, if the force has a preload, or if other
             cycles precede the loop: the zero of the sensor, a preload and the rubber's memory cannot then be
             distinguished.
-        record_notes: sentences on parts of the record that were left out, and on times that do not agree with the rows.
+        record_notes: warnings on parts of the record that were left out, and on times that do not agree with the rows.
         faulty_rows: by column, indices of faulty rows and their distances from the harmonics in units of noise.
         first_row: index of the loop's first row in the whole record.
         row_noise: correlation of the noise of a row with that of the rows before.
@@ -75,7 +76,7 @@ class MeasuredLoop(MeasuredBase):
     coefficients: Array
     half_range: float
     datum: float | None = None
-    record_notes: tuple[str, ...] = ()
+    record_notes: tuple[Caveat, ...] = ()
     faulty_rows: Mapping[str, OutlierRows] = field(default_factory=dict)
     first_row: int = 0
     row_noise: RowNoise = field(default_factory=RowNoise)
@@ -88,8 +89,8 @@ class MeasuredLoop(MeasuredBase):
     components = ("force",)
 
     @property
-    def notes(self) -> Sequence[str]:
-        """Sentences for the user: left-out parts of the record, a preload, or a contradiction between loops."""
+    def notes(self) -> Sequence[Caveat]:
+        """Warnings: left-out parts of the record, a preload, or a contradiction between loops."""
         return [*self.record_notes, *([self.contradiction] if self.contradiction else [])]
 
     @property

@@ -8,6 +8,7 @@ from typing import Self
 import numpy as np
 
 from bushfit.campaign.schema import Residuals
+from bushfit.caveat import Caveat
 from bushfit.effects.contract import Array, RubberConditions, Values
 from bushfit.fitting.measured_test import MeasuredBase
 from bushfit.fitting.noise import SweepNoise
@@ -79,8 +80,8 @@ class MeasuredSweep(MeasuredBase):
         object.__setattr__(self, "weights", np.broadcast_to(self.weights, order.shape))
 
     @cached_property
-    def notes(self) -> list[str]:
-        """Sentences for the user on the file, repeats that differ, contradictory tests, and rounded values."""
+    def notes(self) -> list[Caveat]:
+        """Warnings on the file, repeats that differ, contradictory tests, and rounded values."""
         file = self.source.file if self.source else self.name
         notes = [*self.source.notes] if self.source else []
         points = np.unique([self.frequency, self.amplitude], axis=1, return_inverse=True)[1]
@@ -88,7 +89,8 @@ class MeasuredSweep(MeasuredBase):
             rows = [f"{one} and {second}" for _, *pair in pairs for one, second in [sorted(self.order[pair] + 1)]]
             more = f" and {len(rows) - _MOST_LISTED} more pairs" if len(rows) > _MOST_LISTED else ""
             difference = f"repeats of the same points differ by up to {number(100.0 * pairs[0][0], 2)} %"
-            notes.append(f"{file}: {difference}, rows {', '.join(rows[:_MOST_LISTED])}{more}")
+            listed = f"rows {', '.join(rows[:_MOST_LISTED])}{more}"
+            notes.append(Caveat("points_differ", f"{difference}, {listed}").about(file))
         if self.contradiction:
             notes.append(self.contradiction)
         sizes = np.unique(np.log(np.abs(self.measured)).round(_DIGITS))
@@ -96,7 +98,7 @@ class MeasuredSweep(MeasuredBase):
         if sizes.size <= _FEW_SIZES * self.measured.size and step >= _COARSE:
             coarse = f"{sizes.size} magnitudes at {self.measured.size} points, {number(100.0 * step, 2)} % apart"
             rounded = "they are rounded, and the rounding error is included in the noise; save more digits"
-            notes.append(f"{file}: {coarse}: {rounded}")
+            notes.append(Caveat("rounded", f"{coarse}: {rounded}").about(file))
         return [*notes, *filter(None, [self.noise.excess_warnings.get(self.name)])]
 
     @property

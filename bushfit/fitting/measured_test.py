@@ -7,6 +7,7 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
+from bushfit.caveat import Caveat
 from bushfit.effects.contract import UNKNOWN, Array, RubberConditions, Values
 from bushfit.fitting.shared_errors import SharedErrors
 from bushfit.geometry import Place
@@ -33,7 +34,7 @@ class MeasuredBase(ABC):
             a sweep's file.
         model_error: standard deviation of the model's error, added to the noise, relative to |K| in phase and in
             quadrature, or relative to half the force range of a loop. 0: noise alone.
-        contradiction: sentence on a disagreement with an earlier test of the same points; None without one.
+        contradiction: warning on a disagreement with an earlier test of the same points; None without one.
     """
 
     kind: ClassVar[Kind]
@@ -42,7 +43,7 @@ class MeasuredBase(ABC):
     weights: Array
     test_conditions: RubberConditions = UNKNOWN
     model_error: float = 0.0
-    contradiction: str | None = None
+    contradiction: Caveat | None = None
 
     @abstractmethod
     def relative_difference(self, model: Model) -> Array:

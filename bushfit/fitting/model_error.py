@@ -24,6 +24,7 @@ from dataclasses import replace
 import numpy as np
 
 from bushfit.campaign.schema import UNSTATED, RigSettings
+from bushfit.caveat import Caveat
 from bushfit.effects import BASE
 from bushfit.effects.contract import Array
 from bushfit.effects.unnamed import Unnamed
@@ -71,7 +72,7 @@ _MAXIMUM_ROUNDS, _SETTLED = 12, 0.02
 
 def with_excess_errors(
     plain_fit: FitResult, bounds: Bounds, rig: RigSettings, refit: Callable[[LevelErrors], FitResult]
-) -> tuple[FitResult, Unnamed | None, list[str]]:
+) -> tuple[FitResult, Unnamed | None, list[Caveat]]:
     """Repeat a fit with errors that its tests show beyond the noise: of the model, or of levels (constant amplitudes).
 
     If levels disagree by more than chance explains, the rig or the model may be the cause, so the fit includes errors
@@ -91,7 +92,8 @@ def with_excess_errors(
     if error:
         size = max(error.rms, *(test.model_error for test in found.problem.tests))
         rest = "; parameters are the closest fit, and their intervals include this misfit"
-        return found, error, [f"the model misses the tests by {number(100.0 * size, 2)} %{rest}"]
+        sentence = f"the model misses the tests by {number(100.0 * size, 2)} %{rest}"
+        return found, error, [Caveat("model_error", sentence)]
     if not found.names:
         return found, None, []
     errors = level_errors(found.problem.tests, found.residual, found.jacobian, largest_error(rig))
@@ -103,7 +105,7 @@ def with_excess_errors(
         f"levels disagree by more than their repeats, as if each had an error of {format_class_errors(errors.error)}: "
         "parameters are the closest fit, and their intervals include this error"
     )
-    return found, error, [text] if error else []
+    return found, error, [Caveat("levels_disagree", text)] if error else []
 
 
 def with_model_error(

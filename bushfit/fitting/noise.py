@@ -12,6 +12,7 @@ import numpy as np
 from scipy.special import chdtrc, fdtrc
 
 from bushfit.campaign.schema import UNSTATED, RigSettings
+from bushfit.caveat import Caveat
 from bushfit.effects.contract import Array
 from bushfit.fitting.repeats import (
     FEWEST_SOUGHT,
@@ -74,7 +75,7 @@ class SweepNoise:
     slopes: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     level: tuple[float, float] = (0.0, 0.0)
     level_freedom: int = 0
-    excess_warnings: Mapping[str, str] = field(default_factory=dict)
+    excess_warnings: Mapping[str, Caveat] = field(default_factory=dict)
 
     def scatter(self, name: str, held_values: Array, step: Array) -> Array:
         """Standard deviation of relative gain and of phase [rad] from point to point, at n points of a sweep, (2, n).
@@ -153,13 +154,14 @@ def sweep_noise(sweeps: Sequence[Sweep], rig: RigSettings = UNSTATED) -> SweepNo
     if repeated:
         freedom = max(round(sum(line.shared_freedom for line in repeated)), _ENOUGH)
         largest = np.maximum(largest_error(rig), largest_error(UNSTATED))  # [rig] states what repeats share
-        excesses = dict[str, str]()
+        excesses = dict[str, Caveat]()
         for name in by_name:
             error = _shared_errors([line for key, line in lines.items() if key[0] == name], rig)
             if np.any(error > largest):
-                excesses[name] = (
+                excesses[name] = Caveat(
+                    "runs_differ",
                     f"repeats differ as a whole by an error of {format_class_errors(_pair(error))}, more than a rig of "
-                    f"this class causes, {describe_class(rig)}. Measure again, or state the class under [rig]"
+                    f"this class causes, {describe_class(rig)}. Measure again, or state the class under [rig]",
                 )
         errors = _pair(_shared_errors(repeated, rig)), "repeats", freedom, scatter_freedom
         return SweepNoise(random, *errors, slopes, class_errors(rig, (0.0, 0.0)), excess_warnings=excesses)

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 from scipy.special import fdtrc
 
 from bushfit.campaign.schema import ParameterSetting
+from bushfit.caveat import Caveat
 from bushfit.fitting.assess import covariance, preload_ranges
 from bushfit.fitting.levels import level_errors
 from bushfit.fitting.preparation import MeasuredTest, split_by_kind, with_gain_weighting, with_level_errors
@@ -48,13 +49,13 @@ def with_preload(data: PreparedCampaign) -> PreparedCampaign:
         data: campaign with prepared tests.
 
     Returns:
-        The campaign, with the effect in its [fit], or with a sentence that the tests show no influence; unchanged if
+        The campaign, with the effect in its [fit], or with a warning that the tests show no influence; unchanged if
         [fit] has the effect, or if all tests of each direction have one preload.
     """
     ranges = preload_ranges(data.data_sets)
     if PRELOAD in data.effects or not ranges:
         return data
-    fit, notes, has_influence = data.campaign.fit, list[str](), False
+    fit, notes, has_influence = data.campaign.fit, list[Caveat](), False
     fixed: Sequence[str] = ()
     line = "square of the preload, because the bushing is symmetric"
     if max(tested.count for tested in ranges) == 2:
@@ -67,17 +68,19 @@ def with_preload(data: PreparedCampaign) -> PreparedCampaign:
         chance = _probability_of_chance(data, tests, fixed)
         listed = f"{tested.place}: {tested.count} preloads, {tested.text(place)}"
         if chance > _CHANCE / len(ranges):
-            notes.append(
+            sentence = (
                 f"{listed}: these tests show no influence of the preload on stiffness and loss: noise explains "
                 f"their differences (p = {number(chance, 2)})"
             )
+            notes.append(Caveat("no_preload_influence", sentence))
             continue
         has_influence = True
         if tested.count == 2:
-            notes.append(
+            sentence = (
                 f"{listed}: the model follows a straight line over the {line}, which two preloads cannot confirm. "
                 "Add tests at a third preload between them"
             )
+            notes.append(Caveat("two_preloads", sentence))
     if not has_influence:
         return replace(data, preload_notes=tuple(notes))
     absent = {name: ParameterSetting(value=0.0, vary=False) for name in fixed}

@@ -9,6 +9,7 @@ from typing import TypeVar
 import numpy as np
 
 from bushfit.campaign.schema import UNSTATED, Residuals, RigSettings
+from bushfit.caveat import Caveat
 from bushfit.effects.contract import Array
 from bushfit.fitting.measured_loop import MeasuredLoop
 from bushfit.fitting.measured_sweep import MeasuredSweep
@@ -115,7 +116,7 @@ def prepare_sweeps(
 
 
 def _with_contradictions(tests: Sequence[_Kind], conditions: Sequence[Array]) -> list[_Kind]:
-    """Add a sentence to each test that contradicts an earlier test, on the pair of points that differs most.
+    """Add a warning to each test that contradicts an earlier test, on the pair of points that differs most.
 
     Args:
         tests: loops, or sweeps.
@@ -134,7 +135,8 @@ def _with_contradictions(tests: Sequence[_Kind], conditions: Sequence[Array]) ->
         first, later = np.sort(owner[pair])
         if first != later:  # a file that contradicts itself tells so
             difference = f"their stiffness differs by {number(100.0 * separation, 2)} %"
-            marked[later] = replace(tests[later], contradiction=f"it repeats {tests[first].name}, and {difference}")
+            contradiction = Caveat("test_repeat_differs", f"it repeats {tests[first].name}, and {difference}")
+            marked[later] = replace(tests[later], contradiction=contradiction)
     return marked
 
 

@@ -5,11 +5,11 @@ the samples (any number of cycles, sine or triangle, evenly sampled or not). The
 depends, are then free of the sensor's noise.
 """
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
+from bushfit.caveat import Caveat
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError
 from bushfit.fitting.loop_cycles import steady_cycles, wrong_clock
@@ -75,9 +75,14 @@ def prepare_loop(loop: Loop, *, without_outliers: bool = False) -> MeasuredLoop:
         phase, force, weights = phase_bins(*rows, frequency, cycles, each_cycle=from_rest)
     notes = [*loop.source.notes] if loop.source else []
     if loop.part and loop.part.left_out:
-        notes.append(loop.part.left_out)
+        notes.append(Caveat("cycles_left_out", loop.part.left_out))
     if loop.softening is not None:
-        notes.append(f"the first cycle is {number(100 * loop.softening, 2)} % stiffer than the last (Mullins)")
+        sentence = f"the first cycle is {number(100 * loop.softening, 2)} % stiffer than the last (Mullins)"
+        notes.append(Caveat("softening", sentence))
+    if left_out:
+        notes.append(Caveat("cycles_left_out", left_out))
+    if mistaken := wrong_clock(loop, found.motion):
+        notes.append(Caveat("wrong_waveform", mistaken))
     prepared = MeasuredLoop(
         test=loop,
         frequency=np.array([frequency]),
@@ -89,7 +94,7 @@ def prepare_loop(loop: Loop, *, without_outliers: bool = False) -> MeasuredLoop:
         noise=max(noise, FLOOR * half_force),
         coefficients=found.motion,
         half_range=half_force,
-        record_notes=(*notes, *filter(None, (left_out, wrong_clock(loop, found.motion)))),
+        record_notes=tuple(notes),
         faulty_rows=found.outliers,
         first_row=first_row,
     )
@@ -236,7 +241,7 @@ def recorded_means(prepared: MeasuredLoop) -> list[Preload]:
     return means
 
 
-def _preload_notes(prepared: MeasuredLoop) -> Sequence[str]:
+def _preload_notes(prepared: MeasuredLoop) -> list[Caveat]:
     """Note on the mean displacement and force of a loop without a stated preload; none if they are small."""
     loop, motion = prepared.test, prepared.test.direction.motion
     means = recorded_means(prepared)
@@ -244,7 +249,8 @@ def _preload_notes(prepared: MeasuredLoop) -> Sequence[str]:
         return []
     words = {motion.displacement_unit: motion.words[0], motion.force_unit: motion.words[1]}
     listed = " and ".join(f"a mean {words[mean.unit]} of {mean.text(loop.direction, 3)}" for mean in means)
-    return [f"recorded about {listed}, but no preload is stated: the fit uses the loop about its mean"]
+    sentence = f"recorded about {listed}, but no preload is stated: the fit uses the loop about its mean"
+    return [Caveat("mean_load", sentence)]
 
 
 def correlation_text(loop: MeasuredLoop) -> str:

@@ -11,6 +11,7 @@ import numpy as np
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.constraints import constraints_of
 from bushfit.campaign.session import measured_session
+from bushfit.caveat import Caveat
 from bushfit.effects import BASE, effect_name_of, get_effect, with_base
 from bushfit.errors import FitError, ModelError, error_location
 from bushfit.fitting.assess import check_strain, mixed_condition_warnings
@@ -50,7 +51,7 @@ class PreparedCampaign:
         loops: measured loops with their noise.
         sweeps: measured sweeps with their noise.
         bounds: limits of parameters from [fit] [SI], by name.
-        preload_notes: sentences that state whether the tests show an influence of the preload.
+        preload_notes: warnings that state whether the tests show an influence of the preload.
         constraints: priors and ties of parameters, for every model that is fitted.
     """
 
@@ -58,7 +59,7 @@ class PreparedCampaign:
     loops: tuple[MeasuredLoop, ...]
     sweeps: tuple[MeasuredSweep, ...]
     bounds: Bounds = field(default_factory=dict)
-    preload_notes: tuple[str, ...] = ()
+    preload_notes: tuple[Caveat, ...] = ()
     constraints: Constraints = UNCONSTRAINED
 
     @classmethod
@@ -94,22 +95,22 @@ class PreparedCampaign:
         return [*self.loops, *self.sweeps]
 
     @property
-    def notes(self) -> list[str]:
+    def notes(self) -> list[Caveat]:
         """Warnings about the recorded data of the tests, and about mixed specimens or preloads."""
-        of_tests = [f"{test.name}: {note}" for test in self.data_sets for note in test.notes]
+        of_tests = [note.about(test.name) for test in self.data_sets for note in test.notes]
         return [*of_tests, *mixed_condition_warnings(self.data_sets)]
 
     @property
-    def assumptions(self) -> list[str]:
+    def assumptions(self) -> list[Caveat]:
         """Warnings about the influence of preload, and about a rig whose accuracy is neither stated nor measured."""
         is_assumed = any(sweep.noise.origin == "assumed" for sweep in self.sweeps)
         if not is_assumed or None not in self.campaign.rig.stiffness_errors:
             return [*self.preload_notes]
-        return [
-            *self.preload_notes,
+        sentence = (
             "no test was repeated at three points or more: errors shared by a run are taken from the class of the "
-            f"rig, {describe_class(self.campaign.rig)}",
-        ]
+            f"rig, {describe_class(self.campaign.rig)}"
+        )
+        return [*self.preload_notes, Caveat("assumed_rig_class", sentence)]
 
     @property
     def robust(self) -> bool:

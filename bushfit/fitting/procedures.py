@@ -7,6 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from bushfit.caveat import Caveat
 from bushfit.effects import BASE, effect_name_of, get_effect
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError
@@ -102,7 +103,7 @@ def fit_joint(
         return estimate(replace(problem, model=found.model, tests=with_errors), robust=data.robust)
 
     found, error, notes = with_excess_errors(found, data.bounds, data.campaign.rig, refit)
-    notes = [note + NEXT for note in notes]
+    notes = [replace(note, text=note.text + NEXT) for note in notes]
     notes += unfitted_warnings(found.model, unused, NEXT)
     usable = expected_errors(found.model, found.problem.tests, unused, found)
     result = build_result([found], data.bounds, unused=unused, advice=NEXT)
@@ -213,7 +214,7 @@ def _fit_without_springpot(data: PreparedCampaign) -> FitResult:
     return _fit_step(data, data.static_loops(), ("elastic", "friction"), {})
 
 
-def _springpot_warning(data: PreparedCampaign, static: FitResult) -> str:
+def _springpot_warning(data: PreparedCampaign, static: FitResult) -> Caveat:
     """Warning that states by how many per cent the static parameters changed because the springpot was left out."""
     values, two_step = static.model.values, None
     with suppress(FitError):  # no sweep, or none that goes with the loops
@@ -226,10 +227,11 @@ def _springpot_warning(data: PreparedCampaign, static: FitResult) -> str:
         better = _fit_step(data, static.problem.tests, BASE, fixed).model.values
         source = f"With the springpot of a typical filled rubber (m = {ratio} mu s^alpha, alpha = {alpha})"
     changes = ", ".join(f"{name} by {100 * (better[name] / values[name] - 1):+.1f} %" for name in STATIC)
-    return (
+    return Caveat(
+        "springpot_left_out",
         "m and alpha are not known yet, so the springpot was left out: the other parameters include its stiffness and "
         f"loss at the rate of the loop. {source}, these parameters change: {changes}. bushfit run alternates the two "
-        "fits, and bushfit fit fits all parameters together"
+        "fits, and bushfit fit fits all parameters together",
     )
 
 
@@ -254,7 +256,7 @@ def _fit_step(
 
 
 def _with_campaign(
-    data: PreparedCampaign, steps: Sequence[FitResult], result: Result, notes: Sequence[str] = ()
+    data: PreparedCampaign, steps: Sequence[FitResult], result: Result, notes: Sequence[Caveat] = ()
 ) -> Result:
     """Add the specimens, the outliers and the warnings on the campaign to the result of a procedure.
 
@@ -262,7 +264,7 @@ def _with_campaign(
         data: prepared campaign.
         steps: fits of the procedure, in order.
         result: result of these fits.
-        notes: sentences to report first.
+        notes: warnings to report first.
     """
     model, tests = result.model, [test for step in steps for test in step.data_sets]
     outliers = tuple(outlier for step in steps for outlier in step.outliers)
@@ -272,12 +274,14 @@ def _with_campaign(
         *temperature_warning(model, tests),
         *data.assumptions,
         *(
-            f"the tie {tie.name} = {tie.expression} is not used: the model lacks {', '.join(lacking)}"
+            Caveat(
+                "unused_tie", f"the tie {tie.name} = {tie.expression} is not used: the model lacks {', '.join(lacking)}"
+            )
             for tie in data.constraints.ties
             if (lacking := [name for name in (tie.name, *tie.names) if name not in model.values])
         ),
         *(
-            f"the prior {prior.source} is not used: the model lacks {', '.join(prior.names)}"
+            Caveat("unused_prior", f"the prior {prior.source} is not used: the model lacks {', '.join(prior.names)}")
             for prior in data.constraints.priors
             if model.values.keys().isdisjoint(prior.names)
         ),
@@ -293,7 +297,7 @@ def build_result(
     *,
     model: Model | None = None,
     fixed: Covariance | None = None,
-    notes: Sequence[str] = (),
+    notes: Sequence[Caveat] = (),
     unused: Sequence[MeasuredTest] = (),
     bounded_is_fixed: bool = False,
     advice: str = "",
@@ -321,20 +325,20 @@ def build_result(
     stages = [step.stage(step.at_bound if without_bounded else ()) for step in steps]
     cov = covariance(last.model, stages, fixed, last.smooth_error)
     priors = {name: use for step in steps for name, use in prior_uses(step, cov).items()}
-    sentences = [*notes, *prior_warnings(priors)]
+    warnings = [*notes, *prior_warnings(priors)]
     for step in steps:
         limited, limits = replace(step, problem=replace(step.problem, bounds=bounds)), dict[str, float | None]()
         for name, end in step.at_bound.items():
             if bounds.get(name, (None, None))[end == "max"] is None:
                 limits[name] = find_limit(limited, name, "max" if end == "min" else "min")
-        sentences += fit_warnings(last.model, step, limits, cov, advice)
+        warnings += fit_warnings(last.model, step, limits, cov, advice)
     return Result(
         model,
         tuple(name for name in names if not (bounded_is_fixed and name in at_bound)),
         cov,
         quality(model, tests, len(names)),
         measured_range(model, tests),
-        tuple(sentences),
+        tuple(warnings),
         sources(tests),
         at_bound=at_bound,
         tests=misfits(model, tests, unused),
@@ -345,7 +349,7 @@ def build_result(
 
 def fit_warnings(
     model: Model, step: FitResult, limits: Mapping[str, float | None], covariance: Covariance, advice: str = ""
-) -> list[str]:
+) -> list[Caveat]:
     """Warnings about the tests of a fit, parameters at bounds, parameters not determined, and a misfit.
 
     Args:
@@ -357,35 +361,36 @@ def fit_warnings(
         advice: text to append to the sentence on a misfit.
 
     Returns:
-        Sentences for the user.
+        Warnings.
     """
     tests, names, at_bound = step.data_sets, step.names, step.at_bound
-    notes = [f"{test.name}: {note}" for test in tests for note in test.notes]
+    notes = [note.about(test.name) for test in tests for note in test.notes]
     if not names:
         found, missed = quality(model, tests, 0), lack_of_fit(model, tests, 0)
-        how = "meet" if missed is None else "miss"
-        extent = "within their noise" if missed is None else f"by {number(np.sqrt(missed), 2)} times their noise"
-        return [
-            *notes,
-            f"nothing was fitted, because every parameter is fixed; the given values {how} the tests {extent} "
-            f"(NRMSE {number(100.0 * found.nrmse, 2)} %, reduced chi-square {number(found.reduced_chi_square, 3)})",
-        ]
-    unknown = covariance.restricted(names).describe_unknown(model.values)
-    sentences = [*([unknown] if unknown else []), *notes]
-    if step.stopped:
-        sentences.append(
-            f"the fit was stopped after {step.evaluations} evaluations of the model, because chi-square hardly fell: "
-            "some parameters are undetermined"
+        kind, agreement = "given_values_meet", "meet the tests within their noise"
+        if missed is not None:
+            kind, agreement = "given_values_miss", f"miss the tests by {number(np.sqrt(missed), 2)} times their noise"
+        sentence = (
+            f"nothing was fitted, because every parameter is fixed; the given values {agreement} "
+            f"(NRMSE {number(100.0 * found.nrmse, 2)} %, reduced chi-square {number(found.reduced_chi_square, 3)})"
         )
+        return [*notes, Caveat(kind, sentence)]
+    unknown = covariance.restricted(names).describe_unknown(model.values)
+    warnings = [*([Caveat("parameter_unknown", unknown)] if unknown else []), *notes]
+    if step.stopped:
+        sentence = f"the fit was stopped after {step.evaluations} evaluations of the model"
+        reason = "because chi-square hardly fell: some parameters are undetermined"
+        warnings.append(Caveat("fit_stopped", f"{sentence}, {reason}"))
     for name, end in at_bound.items():
         if name not in limits:
-            sentences.append(f"{name} is at the {end} given in [fit]")
-        elif (limit := limits[name]) is None:
-            sentences.append(f"{name} ended at a limit of the model: the data do not determine it")
-        else:
+            warnings.append(Caveat("given_bound", f"{name} is at the {end} given in [fit]"))
+            continue
+        shown = "the data do not determine it"
+        if (limit := limits[name]) is not None:
             unit, factor = display_unit(step.model.parameters[name].unit, 1.0, limit)
             how = f"at {'most' if end == 'min' else 'least'} {number(factor * limit, 2)} {unit}".rstrip(" -")
-            sentences.append(f"{name} ended at a limit of the model: the tests only show that it is {how} (95 %)")
+            shown = f"the tests only show that it is {how} (95 %)"
+        warnings.append(Caveat("parameter_limit", f"{name} ended at a limit of the model: {shown}"))
     judged = [name for name in names if name not in at_bound and effect_name_of(name) != PRELOAD]
-    sentences += undetermined_parameters(model, step.problem.tests, judged, covariance)
-    return sentences if step.smooth_error else [*sentences, *misfit_warnings(model, tests, len(names), advice)]
+    warnings += undetermined_parameters(model, step.problem.tests, judged, covariance)
+    return warnings if step.smooth_error else [*warnings, *misfit_warnings(model, tests, len(names), advice)]

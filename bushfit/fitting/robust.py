@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from bushfit.caveat import Caveat
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError
 from bushfit.fitting.descent import TOLERANCE, Descent
@@ -103,7 +104,7 @@ def estimate(problem: FitProblem, *, robust: bool = False, lmfit: bool = False) 
     )
 
 
-def outlier_warnings(outliers: Sequence[Outlier], *, robust: bool) -> list[str]:
+def outlier_warnings(outliers: Sequence[Outlier], *, robust: bool) -> list[Caveat]:
     """Warnings about the outliers that the fit includes and those that it leaves out, with the first rows of each test.
 
     Outliers of the displacement are always left out, see `prepared_loop`.
@@ -113,12 +114,12 @@ def outlier_warnings(outliers: Sequence[Outlier], *, robust: bool) -> list[str]:
         robust: True if the fit left the outliers out.
 
     Returns:
-        At most two sentences.
+        At most two warnings.
     """
-    sentences = []
-    for is_excluded, consequence in (
-        (False, " and the fit includes them: {}; --loss soft_l1 leaves them out"),
-        (True, ", left out of the fit: {}"),
+    warnings = []
+    for is_excluded, kind, decision in (
+        (False, "outliers_included", " and the fit includes them: {}; --loss soft_l1 leaves them out"),
+        (True, "outliers_excluded", ", left out of the fit: {}"),
     ):
         rows, lists = defaultdict[str, list[str]](list), []
         for outlier in outliers:
@@ -129,5 +130,5 @@ def outlier_warnings(outliers: Sequence[Outlier], *, robust: bool) -> list[str]:
             lists.append(f"{file} row{'s' if len(numbers) > 1 else ''} {', '.join(numbers[:_MOST_NAMED])}{more}")
         if count := sum(map(len, rows.values())):
             points = f"{count} point{'s lie' if count > 1 else ' lies'} farther from the model than noise explains"
-            sentences.append(points + consequence.format("; ".join(lists)))
-    return sentences
+            warnings.append(Caveat(kind, points + decision.format("; ".join(lists))))
+    return warnings

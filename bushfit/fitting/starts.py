@@ -87,7 +87,7 @@ def start_values(
     if inside != found and (reasons := implausible_modulus(bushing, data_sets)):
         raise FitError(
             "the moduli of these tests are impossible for rubber",
-            found=reasons[0],
+            found=reasons[0].text,
             hint="if units and dimensions are right, give start values in [fit] of the campaign",
         )
     return {**inside, **fixed}

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from bushfit.caveat import Caveat
 from bushfit.inspection.labels import wrong_labels
 from bushfit.inspection.plausible import implausible_sizes
 from bushfit.reading.measurement import Floats, Loop
@@ -61,7 +62,7 @@ class RecordedChannel(NamedTuple):
 
 def odd_recording(
     record: Loop, labels: Labels, frequencies: Sequence[float], amplitudes: Sequence[float], stiffness: Sequence[float]
-) -> list[str]:
+) -> list[Caveat]:
     """Find oddities of a record: labels that contradict it, implausible sizes, and faults of its channels.
 
     Args:
@@ -72,7 +73,7 @@ def odd_recording(
         stiffness: magnitudes of the stiffness at these amplitudes [N/m, N m/rad or Pa], (n,).
 
     Returns:
-        One sentence for each oddity.
+        One warning for each oddity.
     """
     place, sampling_rate = record.direction, 1.0 / float(np.median(np.diff(record.time)))
     names, units = place.motion.words, place.display
@@ -89,11 +90,11 @@ def odd_recording(
     return odd
 
 
-def gaps(motion: RecordedChannel, record: Loop) -> Iterator[str]:
+def gaps(motion: RecordedChannel, record: Loop) -> Iterator[Caveat]:
     """Find gaps in the recorded time, or in the motion if no time was recorded.
 
     Yields:
-        One sentence on the number of gaps, and on the first.
+        One warning on the number of gaps, and on the first.
     """
     steps = np.diff(record.time) if record.has_recorded_time else np.abs(np.diff(motion.values))
     usual = np.median(steps)
@@ -108,14 +109,15 @@ def gaps(motion: RecordedChannel, record: Loop) -> Iterator[str]:
     if not record.has_recorded_time:
         ends = f"{motion.format_row(first)} to {motion.format_row(first + 1)} {motion.unit}"
         channel, size = "the motion", f"the {motion.name} jumps from {ends} in one row"
-    yield f"{count} gap{'s' * (count > 1)} in {channel}, the first after data row {first + 1}: {size}"
+    sentence = f"{count} gap{'s' * (count > 1)} in {channel}, the first after data row {first + 1}: {size}"
+    yield Caveat("gaps", sentence)
 
 
-def stuck_rows(motion: RecordedChannel, force: RecordedChannel) -> Iterator[str]:
+def stuck_rows(motion: RecordedChannel, force: RecordedChannel) -> Iterator[Caveat]:
     """Find rows in which the recorder repeats its values although the motion continued.
 
     Yields:
-        One sentence on the longest run of such rows.
+        One warning on the longest run of such rows.
     """
     moves = (np.diff(motion.values) != 0.0) | (np.diff(force.values) != 0.0)
     last, smallest = motion.values.size - 1, _STUCK_MOTION * np.ptp(motion.values)
@@ -127,14 +129,15 @@ def stuck_rows(motion: RecordedChannel, force: RecordedChannel) -> Iterator[str]
     if stuck:
         longest = max(stuck, key=lambda rows: rows.stop - rows.start)
         rows = f"{longest.stop - longest.start} rows from data row {longest.start + 1} on"
-        yield f"{rows} repeat the same {motion.name} and {force.name}, although the motion continued"
+        sentence = f"{rows} repeat the same {motion.name} and {force.name}, although the motion continued"
+        yield Caveat("stuck_rows", sentence)
 
 
-def cut_off_ends(channel: RecordedChannel) -> Iterator[str]:
+def cut_off_ends(channel: RecordedChannel) -> Iterator[Caveat]:
     """Find a channel that is clipped at its largest or smallest value.
 
     Yields:
-        One sentence for each end.
+        One warning for each end.
     """
     values, span = channel.values, float(np.ptp(channel.values))
     rounding, steps = 1e-9 * span, np.abs(np.diff(values))
@@ -146,14 +149,15 @@ def cut_off_ends(channel: RecordedChannel) -> Iterator[str]:
         below = int(np.count_nonzero(depth <= width)) - flat_rows
         if flat_rows >= max(_FLAT_ROWS, _FLAT_RATIO * below):
             extreme = f"{channel.format_row(row)} {channel.unit}"
-            yield f"the {channel.name} is cut off at its {side}: {flat_rows} rows are exactly {extreme}"
+            sentence = f"the {channel.name} is cut off at its {side}: {flat_rows} rows are exactly {extreme}"
+            yield Caveat("cut_off", sentence)
 
 
-def single_outliers(channel: RecordedChannel, record: Loop) -> Iterator[str]:
+def single_outliers(channel: RecordedChannel, record: Loop) -> Iterator[Caveat]:
     """Find single rows of a channel that are far from their neighbours.
 
     Yields:
-        One sentence, which lists the first three rows.
+        One warning, which lists the first three rows.
     """
     rows = np.flatnonzero(lone_outliers(record.time, channel.values))
     if rows.size:
@@ -163,4 +167,5 @@ def single_outliers(channel: RecordedChannel, record: Loop) -> Iterator[str]:
             for row in rows[:3]
         )
         more = f" and {rows.size - 3} more" if rows.size > 3 else ""
-        yield f"the {channel.name} has {'outliers' if rows.size > 1 else 'an outlier'} at {listed}{more}"
+        count = "outliers" if rows.size > 1 else "an outlier"
+        yield Caveat("outlying_samples", f"the {channel.name} has {count} at {listed}{more}")

@@ -12,6 +12,7 @@ import numpy as np
 
 from bushfit.campaign.campaign import TEST_FILES
 from bushfit.campaign.copies import group_copies
+from bushfit.caveat import Caveat
 from bushfit.errors import BushfitError, NoColumnError, NoTestError, printable
 from bushfit.fitting.measured_loop import MeasuredLoop
 from bushfit.fitting.measured_sweep import MeasuredSweep
@@ -294,12 +295,13 @@ def with_contradictions(files: Sequence[Inspection]) -> list[Inspection]:
     loops = [inspection.measured for inspection in files if isinstance(inspection.measured, Loop)]
     sweeps = [inspection.measured for inspection in files if isinstance(inspection.measured, Sweep)]
     names = {id(inspection.measured): str(inspection.file.parent / inspection.label) for inspection in files}
-    oddities: defaultdict[int, list[str]] = defaultdict(list)
+    oddities: defaultdict[int, list[Caveat]] = defaultdict(list)
     groups: list[list[Loop] | list[Sweep]] = [*group_copies(loops), *group_copies(sweeps)]
     for copies in groups:
         for test in copies if len(copies) > 1 else ():
             same_data = " and ".join(names[id(copy)] for copy in copies if copy is not test)
-            oddities[id(test)].append(f"the same data are in {same_data}: a campaign uses these data once")
+            sentence = f"the same data are in {same_data}: a campaign uses these data once"
+            oddities[id(test)].append(Caveat("same_data", sentence))
     placed = [inspection for inspection in files if inspection.direction is not None and inspection.kind != "history"]
     for part in dict.fromkeys(inspection.part for inspection in placed):
         tests = [inspection.measured for inspection in placed if inspection.part == part]

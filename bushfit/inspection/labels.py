@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from bushfit.caveat import Caveat
 from bushfit.geometry import Place
 from bushfit.reading.headers import ZERO_TO_PEAK, AmplitudeConvention
 from bushfit.reading.levels import read_condition
@@ -156,7 +157,7 @@ def _constant_quantity(
 
 def wrong_labels(
     labels: Labels, direction: Place, amplitudes: Sequence[float], frequencies: Sequence[float], sampling: float = 0.0
-) -> Iterator[str]:
+) -> Iterator[Caveat]:
     """Warn where the name of a file states an amplitude or a frequency that the file does not contain.
 
     Args:
@@ -167,7 +168,7 @@ def wrong_labels(
         sampling: sampling rate of a record [Hz], which its name may state; 0 for a sweep.
 
     Returns:
-        One sentence for each wrong label.
+        One warning for each wrong label.
     """
     unit, factor = direction.display.displacement
     quantities = (
@@ -187,4 +188,5 @@ def wrong_labels(
         in_file = list(dict.fromkeys(f"{to_display * value:.4g}" for value in values))
         in_file = in_file if len(in_file) <= 4 else [f"{in_file[0]} to {in_file[-1]}"]
         doubt = ": the name may be peak-to-peak" if is_double else ""
-        yield f"the name states {' or '.join(in_name)}, the {name} is {', '.join(in_file)} {written}{doubt}"
+        sentence = f"the name states {' or '.join(in_name)}, the {name} is {', '.join(in_file)} {written}{doubt}"
+        yield Caveat("wrong_label", sentence)

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from bushfit.caveat import Caveat
 from bushfit.effects.mistakes import MISTAKES
 from bushfit.fitting.loop_cycles import waveform
 from bushfit.fitting.measured_loop import MeasuredLoop
@@ -77,19 +78,22 @@ def describe_loop(loop: Loop, labels: Labels) -> Findings:
     odd = odd_recording(loop, labels, [frequency], [amplitude, half_motion], [half_force / amplitude])
     odd += odd_cycles(prepared)
     if prepared.cycles < 1.5 and abs(mean_motion) > 0.9 * half_motion:
-        odd.append(
+        sentence = (
             f"one loading and unloading from {number(to_length * loop.displacement[0], 3)} {length}: a static curve is "
             "read as a loop about its mean. Record three cycles or more, because the first cycles settle the rubber"
         )
+        odd.append(Caveat("single_cycle", sentence))
     if frequency * _LONGEST_CYCLE < 1.0:  # longer than any laboratory waits: what may the file say instead?
         mistakes = [mistake.in_words(prepared.test) for mistake in MISTAKES.values() if mistake.time < 1.0]
         minutes = number(1.0 / frequency / 60.0, 2)
-        odd.append(f"one cycle takes {minutes} min, which is unusual; possible causes: {', or '.join(mistakes)}")
+        sentence = f"one cycle takes {minutes} min, which is unusual; possible causes: {', or '.join(mistakes)}"
+        odd.append(Caveat("slow_cycle", sentence))
     if _SMALLEST_OFFSET * half_motion < abs(mean_motion) <= TOLD_MEAN * amplitude and prepared.datum is not None:
-        odd.append(
+        sentence = (
             f"the mean displacement is {number(to_length * mean_motion, 3)} {length}, "
             f"{number(100 * mean_motion / half_motion, 2)} % of its amplitude: the fit uses the loop about its mean"
         )
+        odd.append(Caveat("mean_motion", sentence))
     return facts, odd
 
 
@@ -160,23 +164,23 @@ def describe_programme(record: Loop, loops: Sequence[Loop], labels: Labels) -> F
         noise = f"noise {percent} % of half the range, per row{correlation_text(prepared)}"
         words = f"{size} {unit} at {prepared.frequency[0]:.4g} Hz, {course}", noise, rest
         facts[f"loop {place}"] = "; ".join(filter(None, words))
-        odd += [f"loop {place}: {note}" for note in odd_cycles(prepared) if note != rest]
+        odd += [note.about(f"loop {place}") for note in odd_cycles(prepared) if note.text != rest]
     facts["sampling"] = describe_sampling(record)
     return facts, odd
 
 
-def odd_cycles(prepared: MeasuredLoop) -> list[str]:
+def odd_cycles(prepared: MeasuredLoop) -> list[Caveat]:
     """List the notes on a loop, changes from cycle to cycle, and a ripple on its motion."""
     return [*prepared.record_notes, *changing_cycles(prepared), *ripple(prepared)]
 
 
-def changing_cycles(prepared: MeasuredLoop) -> Iterator[str]:
+def changing_cycles(prepared: MeasuredLoop) -> Iterator[Caveat]:
     """Warn of a force amplitude, mean force or mean motion that changes from the first to the last cycles of a loop.
 
     Loops of one cycle, or with too few rows in a cycle, are not checked.
 
     Returns:
-        One sentence for each change beyond chance.
+        One warning for each change beyond chance.
     """
     loop, count = prepared.test, int(prepared.cycles + 0.01)
     phase = (loop.time - loop.time[0]) * prepared.frequency
@@ -203,9 +207,10 @@ def changing_cycles(prepared: MeasuredLoop) -> Iterator[str]:
         last, first = format_aligned([factor * amplitude[-1], factor * amplitude[0]], 4)
         percent = number(100 * change / amplitude[0], 2, "+")
         is_settled = abs(last_change) < max(_REAL_CHANGE * error, smallest / 2.0) and amplitude.size > 2
-        yield (
+        yield Caveat(
+            "settling_cycles",
             f"the cycles {'settle' if is_settled else 'are still settling'}: the {force} amplitude goes from "
-            f"{first} {force_unit} in the first cycle to {last} in the last ({percent} %)"
+            f"{first} {force_unit} in the first cycle to {last} in the last ({percent} %)",
         )
     # a time that was made from the motion turns its noise into drift
     smallest_drift = (
@@ -217,14 +222,14 @@ def changing_cycles(prepared: MeasuredLoop) -> Iterator[str]:
     ):
         if abs(mean[-1] - mean[0]) > limit:
             last, first = format_aligned([unit.factor * mean[-1], unit.factor * mean[0]], 3, minimum_digits=1)
-            yield f"the {name} drifts: its mean goes from {first} to {last} {unit.name}"
+            yield Caveat("drift", f"the {name} drifts: its mean goes from {first} to {last} {unit.name}")
 
 
-def ripple(prepared: MeasuredLoop) -> Iterator[str]:
+def ripple(prepared: MeasuredLoop) -> Iterator[Caveat]:
     """Warn of a fast sine superposed on the motion of a loop: mains hum, servo oscillation or sensor noise.
 
     Returns:
-        One sentence on the ripple; none without one.
+        One warning on the ripple; none without one.
 
     Notes:
         The slow harmonics are subtracted from the motion; the ripple is the largest line in the spectrum of the
@@ -247,9 +252,10 @@ def ripple(prepared: MeasuredLoop) -> Iterator[str]:
     if lines[line] > max(_SMALLEST_RIPPLE * float(prepared.amplitude[0]), _RIPPLE_LINE * float(np.median(lines))):
         unit, factor = loop.direction.display.displacement
         is_mains = min(abs(frequency[line] % mains - offset) for mains in (50.0, 60.0) for offset in (0.0, mains)) < 1.0
-        yield (
+        yield Caveat(
+            "ripple",
             f"a ripple of about {number(factor * lines[line], 2)} {unit} at {frequency[line]:.3g} Hz "
             f"({number(100 * lines[line] / prepared.amplitude[0], 2)} % of the amplitude) is superposed on the motion: "
             f"{'mains hum' if is_mains else 'an oscillating controller, or play at the reversals'}? The loop is the "
-            "slow motion"
+            "slow motion",
         )

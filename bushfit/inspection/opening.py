@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from bushfit.campaign.campaign import reader_keywords
+from bushfit.caveat import Caveat
 from bushfit.errors import BushfitError, MeasurementError, error_location
 from bushfit.geometry import Direction, Place, Specimen
 from bushfit.inspection.labels import count_temperatures, keys_from_labels, labels_of_file
@@ -80,7 +81,9 @@ def inspect_file(file: Path, test_options: Mapping[str, Any], of_book: Labels = 
         odd = turned + odd
         if preload := facts.get("preload"):
             if "preload" in label_keys and is_contradicted(entry["preload"], measured):
-                odd.append(f"the preload {entry.pop('preload')} that the text states is not in the record: {preload}")
+                stated = entry.pop("preload")
+                sentence = f"the preload {stated} that the text states is not in the record: {preload}"
+                odd.append(Caveat("wrong_preload", sentence))
             entry.setdefault("preload", preload)
     contents = describe_format(table), describe_columns(table, is_sweep=is_sweep), facts | label_facts, tuple(odd)
     is_uncounted = is_sweep and not counted and "amplitude" not in entry
@@ -159,7 +162,7 @@ def reader_arguments(
         return {**next(reader_keywords(Path(), [test], [file.stem], specimens)), "file": table.opened}
 
 
-def read_either_sign(table: Table, place: Place, entry: dict[str, Any]) -> tuple[Loop, dict[str, Any], list[str]]:
+def read_either_sign(table: Table, place: Place, entry: dict[str, Any]) -> tuple[Loop, dict[str, Any], list[Caveat]]:
     """Read a loop, and reverse the sign of its force if the force falls while the displacement rises.
 
     Args:
@@ -168,7 +171,7 @@ def read_either_sign(table: Table, place: Place, entry: dict[str, Any]) -> tuple
         entry: keys of the test's table in a campaign.
 
     Returns:
-        The loop, its keys in a campaign, and a list with a sentence on the reversed force, if any.
+        The loop, its keys in a campaign, and a list with a warning on the reversed force, if any.
     """
     try:
         return read_loop(**reader_arguments(table, place, entry, LoopFile)), entry, []
@@ -180,11 +183,11 @@ def read_either_sign(table: Table, place: Place, entry: dict[str, Any]) -> tuple
             loop = read_loop(**reader_arguments(table, place, turned, LoopFile))
         except BushfitError:
             raise error from None
-    odd = (
+    sentence = (
         f'"{table.roles["force"].header}" falls where "{table.roles["displacement"].header}" rises: the force '
         "has the opposite sign; state force_sign = -1 in the campaign"
     )
-    return loop, turned, [odd]
+    return loop, turned, [Caveat("reversed_force", sentence)]
 
 
 def is_contradicted(text: str, loop: Loop) -> bool:
@@ -219,7 +222,8 @@ def classify_recording(measured: Loop, by_name: Labels, test: LoopFile) -> tuple
     facts, odd = describe_loop(loops[0], by_name)
     if is_fast or len(points) > 1:
         description = f"at {fastest:.3g} Hz" if is_fast else "of several amplitudes"
-        odd.append(f"a motion {description} is read as a loop; if it is a stepped sine, run bushfit reduce")
+        sentence = f"a motion {description} is read as a loop; if it is a stepped sine, run bushfit reduce"
+        odd.append(Caveat("read_as_loop", sentence))
     return "loop", (facts, odd)
 
 

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from bushfit.caveat import Caveat
 from bushfit.effects.contract import Array
 from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Place
 from bushfit.units import display_unit, number
@@ -18,7 +19,7 @@ _FORCES = {TRANSLATION: (0.0, 2e5), ROTATION: (0.0, 1e5), STRAINING: (0.0, 1e9)}
 _STIFFNESSES = {TRANSLATION: (1e4, 1e11), ROTATION: (1e-3, 1e9), STRAINING: (1e4, 1e10)}
 
 
-def implausible_sizes(place: Place, frequency: Array, amplitude: Array, stiffness: Array) -> Iterator[str]:
+def implausible_sizes(place: Place, frequency: Array, amplitude: Array, stiffness: Array) -> Iterator[Caveat]:
     """Warn of frequencies, amplitudes and stiffness that no test of a rubber part has.
 
     Args:
@@ -28,7 +29,7 @@ def implausible_sizes(place: Place, frequency: Array, amplitude: Array, stiffnes
         stiffness: magnitudes of the stiffness [N/m, N m/rad or Pa], (n,).
 
     Returns:
-        One sentence for each quantity beyond its limits.
+        One warning for each quantity beyond its limits.
     """
     motion = place.motion
     quantities = (
@@ -49,4 +50,5 @@ def implausible_sizes(place: Place, frequency: Array, amplitude: Array, stiffnes
                 f"{' to '.join(dict.fromkeys(number(factor * end, 3) for end in pair))} {shown_unit}"
                 for pair in (ends, (lowest, highest))
             )
-            yield f"{name} of {found} is outside all tests of rubber ({expected}): is the unit in the header right?"
+            sentence = f"{name} of {found} is outside all tests of rubber ({expected})"
+            yield Caveat("implausible_size", f"{sentence}: is the unit in the header right?")

@@ -11,6 +11,7 @@ from typing import Any, Literal
 from typing_extensions import TypedDict
 
 from bushfit.campaign.toml import specimen_lines, toml_value
+from bushfit.caveat import Caveat
 from bushfit.effects.contract import Array
 from bushfit.errors import CampaignError, printable
 from bushfit.geometry import Place, Specimen
@@ -21,8 +22,8 @@ from bushfit.validation import to_json_data
 
 #: A hysteresis loop, a sweep, or the raw history of a stepped sine.
 Kind = Literal["loop", "sweep", "history"]
-#: Findings in the content of a file: facts as texts by label, and a sentence for each oddity.
-Findings = tuple[dict[str, str], list[str]]
+#: Findings in the content of a file: facts as texts by label, and a warning for each oddity.
+Findings = tuple[dict[str, str], list[Caveat]]
 #: Name of the array of tables that lists each kind of test in a campaign.
 _TABLES = {"loop": "loops", "sweep": "sweeps"}
 
@@ -102,7 +103,7 @@ class Inspection:
         written: format of the file by label, such as "encoding".
         columns: all columns of the file, in order.
         facts: properties of the test as texts, by label, such as "frequencies".
-        odd: one sentence for each oddity, such as an outlier.
+        odd: one warning for each oddity, such as an outlier.
         entry: further keys of the test's table in a campaign, with values as TOML gives them.
         measured: the test in SI.
         amplitude_convention_unknown: True for a sweep that does not state whether its amplitudes are zero-to-peak or
@@ -115,7 +116,7 @@ class Inspection:
     written: Mapping[str, str]
     columns: tuple[ColumnDescription, ...]
     facts: Mapping[str, str]
-    odd: tuple[str, ...]
+    odd: tuple[Caveat, ...]
     entry: Mapping[str, Any] = field(default_factory=dict)
     measured: Loop | Sweep | None = None
     amplitude_convention_unknown: bool = False
@@ -173,7 +174,7 @@ class Inspection:
             "columns": to_json_data(self.columns, tuple[ColumnDescription, ...]),
             "facts": dict(self.facts),
             "assumed": self.assumed,
-            "odd": list(self.odd),
+            "odd": [warning.text for warning in self.odd],
         }
 
 

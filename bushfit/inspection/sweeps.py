@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 from scipy.special import pdtrc, stdtr
 
+from bushfit.caveat import Caveat
 from bushfit.effects.contract import Array
 from bushfit.effects.mistakes import MISTAKES
 from bushfit.fitting.measured_sweep import MeasuredSweep
@@ -85,7 +86,7 @@ def describe_sweep(sweep: Sweep, labels: Labels) -> Findings:
     return facts, odd
 
 
-def copied_rows(sweep: Sweep, noise: SweepNoise, points: pd.DataFrame) -> Iterator[str]:
+def copied_rows(sweep: Sweep, noise: SweepNoise, points: pd.DataFrame) -> Iterator[Caveat]:
     """Warn of rows with exactly the stiffness of another row at the same frequency and amplitude.
 
     Args:
@@ -94,7 +95,7 @@ def copied_rows(sweep: Sweep, noise: SweepNoise, points: pd.DataFrame) -> Iterat
         points: frequency, amplitude, repeat and ln K (gain and phase) of its points.
 
     Returns:
-        One sentence, if noise is unlikely to make this number of rows equal in the digits of the file.
+        One warning, if noise is unlikely to make this number of rows equal in the digits of the file.
     """
     keys = ["frequency", "amplitude"]
     rows = points[[*keys, "gain", "phase"]].round({"gain": 9, "phase": 9})  # the conversion of units changes the 16th
@@ -108,13 +109,14 @@ def copied_rows(sweep: Sweep, noise: SweepNoise, points: pd.DataFrame) -> Iterat
     expected = np.sum(repeats * (repeats - 1) / 2.0 * same_digit * np.maximum(same_digit, _SAME_PHASE_P))
     if (count := int(copied.sum())) and pdtrc(count - 1, expected) < _CHANCE:
         row = int(np.argmax(rows.duplicated(keep=False)))
-        yield (
+        yield Caveat(
+            "copied_rows",
             f"{count} row{'s equal other rows' if count > 1 else ' equals another row'} in all digits, the first at "
-            f"{sweep.frequency[row]:.4g} Hz (data row {row + 1}): copied instead of measured?"
+            f"{sweep.frequency[row]:.4g} Hz (data row {row + 1}): copied instead of measured?",
         )
 
 
-def odd_levels(sweep: Sweep, points: pd.DataFrame) -> Iterator[str]:
+def odd_levels(sweep: Sweep, points: pd.DataFrame) -> Iterator[Caveat]:
     """Warn of amplitude levels that may be repeats of one level, and of a level that the rig did not reach.
 
     Args:
@@ -122,26 +124,28 @@ def odd_levels(sweep: Sweep, points: pd.DataFrame) -> Iterator[str]:
         points: frequency, amplitude, repeat and ln K (gain and phase) of its points.
 
     Returns:
-        A sentence if two amplitudes at one frequency are so close that they may be repeats of one level, without
-        numbers in a column `repeat`; and a sentence on the point that missed its level most, if it missed it by much.
+        A warning if two amplitudes at one frequency are so close that they may be repeats of one level, without
+        numbers in a column `repeat`; and a warning on the point that missed its level most, if it missed it by much.
     """
     passes, of_frequency = np.unique(sweep.repeat).size, sweep.frequency.size / np.unique(sweep.frequency).size
     levels = points[["frequency", "amplitude"]].drop_duplicates().sort_values(["frequency", "amplitude"])
     steps = np.log(levels["amplitude"]).groupby(levels["frequency"]).diff().dropna()
     if not steps.empty and steps.min() < _SMALLEST_STEP and round(of_frequency) != passes:
-        yield (
+        yield Caveat(
+            "close_levels",
             f"two amplitudes at {levels['frequency'][steps.idxmin()]:.4g} Hz differ by "
             f"{number(100 * np.expm1(steps.min()), 2)} % and are treated as two levels. If the levels are repeats, "
-            "number the repeats in a column repeat"
+            "number the repeats in a column repeat",
         )
     relative_miss = np.abs(sweep.amplitude_reached / sweep.amplitude - 1.0)
     row = int(np.argmax(relative_miss))
     if relative_miss[row] > MISSED_LEVEL:
         reached, level = (shown_amplitude(sweep.direction, x[row]) for x in (sweep.amplitude_reached, sweep.amplitude))
-        yield f"{reached} was reached instead of the nominal {level} ({sweep.frequency[row]:.4g} Hz)"
+        sentence = f"{reached} was reached instead of the nominal {level} ({sweep.frequency[row]:.4g} Hz)"
+        yield Caveat("missed_level", sentence)
 
 
-def missing_frequencies(place: Place, points: pd.DataFrame) -> Iterator[str]:
+def missing_frequencies(place: Place, points: pd.DataFrame) -> Iterator[Caveat]:
     """Warn of blocks (one repeat of one level) that lack frequencies which most other blocks contain.
 
     Args:
@@ -149,7 +153,7 @@ def missing_frequencies(place: Place, points: pd.DataFrame) -> Iterator[str]:
         points: frequency, amplitude, repeat and ln K (gain and phase) of the points of a sweep.
 
     Returns:
-        One sentence for each incomplete block.
+        One warning for each incomplete block.
     """
     measured = pd.crosstab([points["amplitude"], points["repeat"]], points["frequency"]) > 0
     usual = measured.mean() > 0.5
@@ -158,7 +162,8 @@ def missing_frequencies(place: Place, points: pd.DataFrame) -> Iterator[str]:
         if absent:
             of_repeat = f", repeat {repeat}," if np.unique(points["repeat"]).size > 1 else ""
             listed = ", ".join(absent[:_MOST_LISTED] + ["..."] * (len(absent) > _MOST_LISTED))
-            yield f"{shown_amplitude(place, amplitude)}{of_repeat} lacks {listed} Hz, which most other levels contain"
+            block = f"{shown_amplitude(place, amplitude)}{of_repeat}"
+            yield Caveat("missing_frequencies", f"{block} lacks {listed} Hz, which most other levels contain")
 
 
 def distance_from_curve(sweep: Sweep, points: pd.DataFrame) -> Array:
@@ -197,7 +202,9 @@ def distance_from_curve(sweep: Sweep, points: pd.DataFrame) -> Array:
     return distance
 
 
-def outlying_points(sweep: Sweep, noise: SweepNoise, points: pd.DataFrame, from_repeats: pd.DataFrame) -> Iterator[str]:
+def outlying_points(
+    sweep: Sweep, noise: SweepNoise, points: pd.DataFrame, from_repeats: pd.DataFrame
+) -> Iterator[Caveat]:
     """Warn of points far from their repeats or, for fewer than three repeats, from the smooth curve of their run.
 
     Args:
@@ -207,7 +214,7 @@ def outlying_points(sweep: Sweep, noise: SweepNoise, points: pd.DataFrame, from_
         from_repeats: gain and phase [rad] of each point minus the median of its repeats; nan for fewer than three.
 
     Returns:
-        A sentence on each of the first four outliers, and one on the number of further outliers.
+        A warning on each of the first four outliers, and one on the number of further outliers.
     """
     filled = from_repeats.fillna(0.0)  # what a block has in common is no outlier
     distance = np.array(filled - filled.groupby([points["repeat"], points["amplitude"]]).transform("median"))
@@ -221,16 +228,17 @@ def outlying_points(sweep: Sweep, noise: SweepNoise, points: pd.DataFrame, from_
         level = shown_amplitude(sweep.direction, sweep.amplitude[row])
         repeat = "" if alone[row] else f", repeat {sweep.repeat[row]}"
         reference = "the smooth curve through the others" if alone[row] else "its repeats"
-        yield (
+        yield Caveat(
+            "outlying_point",
             f"data row {row + 1} ({sweep.frequency[row]:.4g} Hz, {level}{repeat}) deviates by "
             f"{number(100 * np.expm1(distance[row, 0]), 2, '+')} % in |K| and {np.degrees(distance[row, 1]):+.2g} deg "
-            f"from {reference}"
+            f"from {reference}",
         )
     if outliers.size > _MOST_LISTED:
-        yield f"{outliers.size - _MOST_LISTED} more points deviate as much"
+        yield Caveat("more_outlying_points", f"{outliers.size - _MOST_LISTED} more points deviate as much")
 
 
-def outlying_blocks(place: Place, points: pd.DataFrame, from_repeats: pd.DataFrame) -> Iterator[str]:
+def outlying_blocks(place: Place, points: pd.DataFrame, from_repeats: pd.DataFrame) -> Iterator[Caveat]:
     """Warn of blocks (one repeat of one level) that differ from the other repeats, and of a drift over the repeats.
 
     Args:
@@ -239,7 +247,7 @@ def outlying_blocks(place: Place, points: pd.DataFrame, from_repeats: pd.DataFra
         from_repeats: gain and phase [rad] of each point minus the median of its repeats; nan for fewer than three.
 
     Returns:
-        One sentence for each outlying block, and one on the drift.
+        One warning for each outlying block, and one on the drift.
     """
     blocks = from_repeats["gain"].groupby([points["repeat"], points["amplitude"]])
     gain = blocks.median()[blocks.count() == blocks.size()]  # of blocks in which all points have repeats
@@ -248,10 +256,11 @@ def outlying_blocks(place: Place, points: pd.DataFrame, from_repeats: pd.DataFra
     usual = MEDIAN_TO_SIGMA * float(np.median(np.abs(gain[gain != 0.0]))) if np.any(gain) else 0.0
     for (repeat, amplitude), block_gain in zip(gain.index, gain, strict=True):
         if abs(block_gain) > max(_FAR * usual, _SMALLEST_BLOCK_OFFSET):
-            yield (
+            yield Caveat(
+                "outlying_block",
                 f"{shown_amplitude(place, amplitude)}, repeat {repeat} differs by "
                 f"{number(100 * np.expm1(block_gain), 2, '+')} % in |K| from the other repeats at all frequencies: "
-                "other amplitude, temperature or mounting?"
+                "other amplitude, temperature or mounting?",
             )
     repeat = gain.index.get_level_values("repeat").to_numpy(float)
     if np.unique(repeat).size > 2 and np.ptp(gain) > 0.0:
@@ -260,24 +269,27 @@ def outlying_blocks(place: Place, points: pd.DataFrame, from_repeats: pd.DataFra
         t = abs(correlation) * np.sqrt(freedom / max(1.0 - correlation**2, 1e-20))
         if 2.0 * stdtr(freedom, -t) < _CHANCE and abs(drift) > _SMALLEST_DRIFT:
             change = number(100 * drift, 2, "+")
-            yield f"|K| drifts by {change} % from the first repeat to the last: warming up, or settling?"
+            sentence = f"|K| drifts by {change} % from the first repeat to the last: warming up, or settling?"
+            yield Caveat("drift", sentence)
 
 
-def odd_losses(sweep: Sweep) -> Iterator[str]:
+def odd_losses(sweep: Sweep) -> Iterator[Caveat]:
     """Warn of negative loss factors, and of a median loss factor that is unusual for rubber.
 
     Returns:
-        A sentence for each, with possible causes.
+        A warning for each, with possible causes.
     """
     negative = np.flatnonzero(sweep.stiffness.imag < 0.0)
     if negative.size:
         level = shown_amplitude(sweep.direction, sweep.amplitude[negative[0]])
-        yield (
+        yield Caveat(
+            "negative_loss",
             f"{negative.size} point{'s' * (negative.size > 1)} with a loss factor below zero, the first at "
-            f"{sweep.frequency[negative[0]]:.4g} Hz, {level}: is the force channel late?"
+            f"{sweep.frequency[negative[0]]:.4g} Hz, {level}: is the force channel late?",
         )
     mistakes = [mistake for mistake in MISTAKES.values() if mistake.doubt and mistake.possible(sweep)]
     if mistakes:
         causes = ", or ".join(mistake.in_words(sweep) for mistake in mistakes)
         loss = number(float(np.median(loss_factor(sweep.stiffness))), 2)
-        yield f"the loss factor is {loss} in the median, unusual for rubber; possible causes: {causes}"
+        sentence = f"the loss factor is {loss} in the median, unusual for rubber; possible causes: {causes}"
+        yield Caveat("unusual_loss", sentence)

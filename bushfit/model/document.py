@@ -255,6 +255,7 @@ class ModelFile:
         model_error: error of the model in the fit, relative to the stiffness.
         alternatives: other models that the tests do not rule out.
         warnings: warnings on the use of the numbers.
+        warning_kinds: kind of each warning, as in bushfit/caveat.toml.
         outliers: points far outside their noise.
         provenance: origin of the file.
         campaign: campaign that the model was fitted to.
@@ -278,6 +279,7 @@ class ModelFile:
     model_error: Unnamed | None = None
     alternatives: tuple[AlternativeTable, ...] = ()
     warnings: Annotated[tuple[str, ...], Field(max_length=10000)] = ()
+    warning_kinds: Annotated[tuple[str, ...], Field(max_length=10000)] = ()
     outliers: tuple[Outlier, ...] = ()
     provenance: ProvenanceTable = field(default_factory=ProvenanceTable)
     campaign: CampaignTable | None = None

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from bushfit.caveat import to_caveats
 from bushfit.effects import ORIGINS
 from bushfit.errors import ModelError, error_location
 from bushfit.geometry import Bushing, Specimen
@@ -96,7 +97,7 @@ def from_document(document: object, file: Path | None = None) -> Result:
             covariance=covariance,
             quality=fit.quality if fit else None,
             measured=fit.measured if fit else None,
-            warnings=tables.warnings + law_warnings,
+            warnings=(*to_caveats(tables.warnings, tables.warning_kinds), *law_warnings),
             inputs=tuple(Source(Path(test.file), test.sha256, test.conditions) for test in tables.provenance.inputs),
             outliers=tables.outliers,
             profile={name: entry.profile95 for name, entry in entries.items() if entry.profile95},
@@ -199,7 +200,8 @@ def to_document(result: Result) -> dict[str, Any]:
             )
             for rival in result.alternatives
         ),
-        warnings=result.warnings,
+        warnings=tuple(warning.text for warning in result.warnings),
+        warning_kinds=tuple(warning.kind for warning in result.warnings),
         outliers=result.outliers,
         provenance=ProvenanceTable(__version__, tuple(inputs), versions()),
         campaign=result.campaign,

@@ -5,6 +5,7 @@ import os
 from pathlib import Path
 from types import ModuleType
 
+from bushfit.caveat import Caveat
 from bushfit.effects import ORIGINS, Origin, register
 from bushfit.errors import ModelError
 from bushfit.reading.files import read_utf8
@@ -47,7 +48,7 @@ def register_file(file: Path, sha256: str = "") -> None:
     register(file.stem, law, origin)
 
 
-def require_effect(name: str, origin: Origin) -> str:
+def require_effect(name: str, origin: Origin) -> Caveat | None:
     """Make an effect from outside the package available that a model file uses.
 
     Args:
@@ -55,7 +56,7 @@ def require_effect(name: str, origin: Origin) -> str:
         origin: origin of the effect when the model was fitted.
 
     Returns:
-        Warning if another version of the package is installed; otherwise empty.
+        Warning if another version of the package is installed; otherwise None.
 
     Raises:
         ModelError: the package is not installed, or the file cannot be used.
@@ -71,5 +72,6 @@ def require_effect(name: str, origin: Origin) -> str:
             hint=f"install {origin.package} in the environment of bushfit",
         )
     elif ORIGINS[name] != origin:
-        return f"{name}: the model was fitted with the law of {origin}, and {ORIGINS[name]} is installed"
-    return ""
+        sentence = f"the model was fitted with the law of {origin}, and {ORIGINS[name]} is installed"
+        return Caveat("other_law", sentence).about(name)
+    return None

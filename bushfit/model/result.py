@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
+from bushfit.caveat import Caveat
 from bushfit.effects.unnamed import Unnamed
 from bushfit.errors import ModelError
 from bushfit.geometry import Bushing, Direction, Place, Specimen, get_place
@@ -291,7 +292,7 @@ class Result:
     covariance: Covariance = field(default_factory=Covariance)
     quality: Quality | None = None
     measured: Range | None = None
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[Caveat, ...] = ()
     inputs: tuple[Source, ...] = ()
     outliers: tuple[Outlier, ...] = ()
     profile: Mapping[str, tuple[float | None, float | None]] = field(default_factory=dict)
@@ -334,8 +335,8 @@ class Result:
         return [*dict.fromkeys(specimen.bushing for specimen in self.specimens if specimen.bushing)]
 
     @property
-    def undecided(self) -> list[str]:
-        """Warning that the tests do not rule out other models, as a list of one sentence; empty if they do."""
+    def undecided(self) -> list[Caveat]:
+        """Warning that the tests do not rule out other models, in a list; empty if they do."""
         if not self.alternatives:
             return []
         added = (sorted(set(alternative.model.effects) - {*self.model.effects}) for alternative in self.alternatives)
@@ -344,7 +345,8 @@ class Result:
         used = "a smooth correction instead" if self.model.unnamed else "the plain model"
         lacking = f"the tests {choice} {' and '.join(names)}: the prediction uses {used}, and"
         open_values = "the tests permit other values of the parameters:"
-        return [f"{lacking if names else open_values} the bands, low to high, include each alternative"]
+        sentence = f"{lacking if names else open_values} the bands, low to high, include each alternative"
+        return [Caveat("undecided", sentence)]
 
     @property
     def fitted_places(self) -> list[Place]:

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from bushfit.caveat import Caveat
 from bushfit.effects import Level
 from bushfit.geometry import Bushing, Direction
 from bushfit.model.model import Model
@@ -60,7 +61,7 @@ def with_factor(result: Result, places: Sequence[str], spread: float) -> Result:
     )
 
 
-def transfer_compound(result: Result, bushing: Bushing) -> tuple[Result, str]:
+def transfer_compound(result: Result, bushing: Bushing) -> tuple[Result, Caveat]:
     """Transfer the compound of a fitted model to another bushing.
 
     Effects of the material and factors of specimens are kept; effects of the first bushing and its rig are left out. If
@@ -71,7 +72,7 @@ def transfer_compound(result: Result, bushing: Bushing) -> tuple[Result, str]:
         bushing: geometry of the other bushing.
 
     Returns:
-        Result for the other bushing, and a sentence that lists the effects that are left out.
+        Result for the other bushing, and a warning that lists the effects that are left out.
     """
     coupons = tuple(specimen for specimen in result.specimens if not specimen.bushing)
     names = [coupon.name for coupon in coupons]
@@ -93,7 +94,7 @@ def transfer_compound(result: Result, bushing: Bushing) -> tuple[Result, str]:
         fitted=tuple(name for name in result.fitted if name in model.values),
         covariance=result.covariance.restricted([*model.values]),
         measured=measured,
-        warnings=tuple(f"{result.name}: {line}" for line in result.warnings if line not in result.undecided),
+        warnings=tuple(line.about(result.name) for line in result.warnings if line not in result.undecided),
         inputs=result.inputs,
         specimens=coupons,
         unresolved=tuple(name for name in result.unresolved if name in model.effects),
@@ -106,4 +107,4 @@ def transfer_compound(result: Result, bushing: Bushing) -> tuple[Result, str]:
     if spread := factor_spread(result):
         elsewhere = with_factor(elsewhere, [*Direction], spread)
         sentence += f"; the bands include {number(100.0 * spread, 2)} % of stiffness, by which bushings differ"
-    return elsewhere, sentence
+    return elsewhere, Caveat("shape_not_tested", sentence)

@@ -7,6 +7,7 @@ import numpy as np
 
 from bushfit.campaign.schema import RigSettings
 from bushfit.campaign.simulated import SimulatedLoop, SimulatedSweep
+from bushfit.caveat import Caveat
 from bushfit.diagnosis.next_test import within_limits
 from bushfit.errors import ModelError
 from bushfit.geometry import TRANSLATION, Direction, Place, bushing_at
@@ -155,7 +156,7 @@ def _round_to_set_point(value: float) -> float:
     return float(f"{value:.2g}")
 
 
-def unlimited_rig_warning(knowledge: Knowledge, rig: RigSettings, tests: Sequence[Test]) -> str | None:
+def unlimited_rig_warning(knowledge: Knowledge, rig: RigSettings, tests: Sequence[Test]) -> Caveat | None:
     """Warning on the velocity, acceleration and force that a plan reaches if [rig] states no limits.
 
     Args:
@@ -164,7 +165,7 @@ def unlimited_rig_warning(knowledge: Knowledge, rig: RigSettings, tests: Sequenc
         tests: runs of the plan.
 
     Returns:
-        Sentence; None if [rig] states a limit, or the plan has no test with a displacement.
+        Warning; None if [rig] states a limit, or the plan has no test with a displacement.
     """
     points = [(test.direction, *operating_points(test)) for test in tests if test.direction.motion is TRANSLATION]
     if not points or any((rig.max_force, rig.max_displacement, rig.max_velocity, rig.max_frequency)):
@@ -175,8 +176,9 @@ def unlimited_rig_warning(knowledge: Knowledge, rig: RigSettings, tests: Sequenc
     acceleration = float(np.max(np.square(2.0 * np.pi * frequency) * amplitude)) / 9.80665
     force = max(float(np.max(np.abs(knowledge.model.stiffness(place, f, x)) * x)) for place, f, x in points)
     point = f"{number(1e3 * amplitude[fastest], 3)} mm at {number(frequency[fastest], 3)} Hz"
-    return (
+    return Caveat(
+        "plan_without_limits",
         f"[rig] states no limits: the plan reaches {number(velocity, 3)} m/s ({point}), "
         f"{number(acceleration, 3)} g and {number(force, 3)} N. State max_velocity, max_force, max_displacement and "
-        "max_frequency, and plan again"
+        "max_frequency, and plan again",
     )

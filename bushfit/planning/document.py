@@ -8,6 +8,7 @@ import numpy as np
 from typing_extensions import TypedDict
 
 from bushfit.campaign.simulated import SimulatedLoop
+from bushfit.caveat import Caveat, WarningEntries, to_entries
 from bushfit.effects import get_effect, qualified_name
 from bushfit.effects.contract import Array
 from bushfit.planning.contract import Aim, Test, operating_points
@@ -100,7 +101,7 @@ class Rivalry(TypedDict):
     enough: float
 
 
-class PlanFile(TypedDict):
+class PlanFile(WarningEntries):
     """plan.json: the tests of a plan and their expected results.
 
     Args:
@@ -137,11 +138,14 @@ class PlanFile(TypedDict):
     loss_factor: dict[str, ErrorComparison]
     visible: dict[str, DetectableEntry]
     rivals: Rivalry | None
-    warnings: list[str]
 
 
 def plan_document(
-    search: PlanSearch, runs: Sequence[int], missed: Sequence[str | None], enough: str | None, warnings: Sequence[str]
+    search: PlanSearch,
+    runs: Sequence[int],
+    missed: Sequence[str | None],
+    enough: str | None,
+    warnings: Sequence[Caveat],
 ) -> PlanFile:
     """Collect the content of plan.json.
 
@@ -208,7 +212,7 @@ def plan_document(
             for name, amount in detectable_amounts(search, planned).items()
         },
         "rivals": rivals,
-        "warnings": list(warnings),
+        **to_entries(warnings),
     }
 
 

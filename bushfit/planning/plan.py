@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from bushfit.caveat import Caveat
 from bushfit.errors import ModelError
 from bushfit.planning.candidates import unlimited_rig_warning
 from bushfit.planning.contract import Knowledge, PlanRequest, Test
@@ -101,9 +102,9 @@ def explain_miss(search: PlanSearch, goal: PlannedQuantity) -> str | None:
         Sentence; None if the tests meet the target.
     """
     counts, limit, covariance = search.counts, search.limit_covariance, search.error_covariance
-    if sentence := search.untested_warning(goal, counts):
+    if warning := search.untested_warning(goal, counts):
         origin = "in the plan" if goal.place in search.request.places else "on offer"
-        return f"no test so far or {origin} covers this target: {sentence}"
+        return f"no test so far or {origin} covers this target: {warning}"
     if not goal.meets_target(limit):
         reached, reason = format_half_width(goal.half_width(limit)), goal.explain_limit(search.knowledge, limit)
         return f"no available test is enough; {UNLIMITED_RUNS} runs of each would reach {reached}: {reason}"
@@ -185,42 +186,48 @@ def explain_free_hours(search: PlanSearch, missed: Sequence[str | None]) -> str 
     return f"{number(planned, 2)} of {number(hours, 3)} h are enough: {reason}, and {number(free, 2)} h remain free"
 
 
-def plan_warnings(search: PlanSearch) -> Iterator[str]:
+def plan_warnings(search: PlanSearch) -> Iterator[Caveat]:
     """Generate the warnings of a plan, the most important first.
 
     Args:
         search: search with the chosen tests.
 
     Returns:
-        Iterator over sentences.
+        Iterator over warnings.
     """
     knowledge, request, counts = search.knowledge, search.request, search.counts
     tests = [search.tests[test] for test in np.flatnonzero(counts)]
-    if sentence := unlimited_rig_warning(knowledge, request.rig, tests):
-        yield sentence
+    if warning := unlimited_rig_warning(knowledge, request.rig, tests):
+        yield warning
     stiffnesses = (quantity for quantity in search.predictions if quantity.name.startswith("stiffness"))
     model_error = max((float(quantity.model_error.max()) for quantity in stiffnesses), default=0.0)
     if model_error > _NOTABLE_RATIO - 1.0:
-        yield (
+        yield Caveat(
+            "plan_model_error",
             f"the errors of the stiffness include the model error, up to {number(100.0 * model_error, 2)} %, "
             "which further tests do not reduce. bushfit diagnose looks for the missing effect; "
-            "to plan with it, give its model.json to bushfit plan"
+            "to plan with it, give its model.json to bushfit plan",
         )
     yield from knowledge.result.warnings
     if knowledge.bounded:
-        yield (
+        yield Caveat(
+            "plan_at_bound",
             f"{' and '.join(knowledge.bounded)} ended at a bound: the planned errors of the other parameters "
-            "include half of the additional error of a fit without the bound"
+            "include half of the additional error of a fit without the bound",
         )
     if search.goals and not search.determines_scatter(counts):
-        yield "repeats are too few to determine the scatter of sweeps: intervals may be 1.5 times as wide as planned"
+        sentence = "repeats are too few to determine the scatter of sweeps"
+        yield Caveat("few_repeats", f"{sentence}: intervals may be 1.5 times as wide as planned")
     if effects := search.less_visible_effects(counts):
-        yield f"the standard programme shows these effects better: {', '.join(effects)}"
+        sentence = f"the standard programme shows these effects better: {', '.join(effects)}"
+        yield Caveat("standard_programme_better", sentence)
     for pair in np.argwhere(np.triu(~search.separable_rivals, 1)).tolist():
         names = (knowledge.rivals[rival].model.effects[-1] for rival in pair)
-        yield f"no test of this rig would distinguish {' from '.join(names)}: these rivals are left out"
+        sentence = f"no test of this rig would distinguish {' from '.join(names)}: these rivals are left out"
+        yield Caveat("rivals_alike", sentence)
     if knowledge.rivals and (chi_square := search.nearest_rivals(counts)) < RIVALS_APART:
-        yield (
+        yield Caveat(
+            "rivals_close",
             f"the expected chi-square between the nearest rivals is {number(chi_square, 2)}, less "
-            f"than the {number(RIVALS_APART, 3)} that distinguishes them in nine of ten cases"
+            f"than the {number(RIVALS_APART, 3)} that distinguishes them in nine of ten cases",
         )

@@ -11,6 +11,7 @@ from itertools import chain
 import numpy as np
 
 from bushfit.campaign.simulated import SimulatedSweep
+from bushfit.caveat import Caveat
 from bushfit.diagnosis.next_test import remaining_entropy
 from bushfit.diagnosis.priors import DECISIVE_CHI_SQUARE
 from bushfit.effects import Effect
@@ -221,7 +222,7 @@ class PlanSearch:
             return False
         return not with_checks or (not self.less_visible_effects(counts) and self.determines_scatter(counts))
 
-    def untested_warning(self, goal: PlannedQuantity, counts: Array) -> str | None:
+    def untested_warning(self, goal: PlannedQuantity, counts: Array) -> Caveat | None:
         """Warning that no test in a target's direction shows the error of its stiffness formula.
 
         Args:
@@ -229,7 +230,7 @@ class PlanSearch:
             counts: number of runs of each test in addition to the tests so far, (tests,).
 
         Returns:
-            Sentence; None if the direction is tested or the target is a parameter.
+            Warning; None if the direction is tested or the target is a parameter.
         """
         place, knowledge = goal.place, self.knowledge
         measured = knowledge.result.measured

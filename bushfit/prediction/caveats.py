@@ -1,16 +1,11 @@
-"""Warnings of a prediction, on directions not fitted, extrapolation and omitted effects, with their consequences.
+"""Warnings of a prediction, on directions not fitted, extrapolation and omitted effects."""
 
-For every warning of the package, `uses.toml` states the consequence for the use of the predicted numbers.
-"""
-
-import re
-import tomllib
 from collections.abc import Iterable, Iterator
 from itertools import chain
-from pathlib import Path
 
 import numpy as np
 
+from bushfit.caveat import Caveat
 from bushfit.effects import Level, get_effect
 from bushfit.effects.contract import Array
 from bushfit.geometry import Bushing, Direction, Place, bushing_at
@@ -28,47 +23,14 @@ BEYOND = "extrapolated outside this range"
 _NOTED_LOWERING = 0.01
 
 
-#: Meaning of a warning for the use of the numbers, by a regular expression that the warning matches.
-_USES: dict[str, str] = tomllib.loads(Path(__file__).with_name("uses.toml").read_text(encoding="utf-8"))
-#: Beginnings or words of these meanings, the most important first.
-_RANKS = (
-    "^Do not use",
-    "^Find out|^Look",
-    "^For .*estimate|^Values",
-    "include the misfit",
-    "^Use|^For|^Settle",
-    "only|do not|no more|near",
-    "",
-)
-
-
 #: Reduced chi-square of a sweep that was not fitted, up to which it agrees within its noise; chosen: 95 % of the values
 #: of 20 points are below.
 _AGREEMENT = 1.4
-#: Pattern of a number in a warning.
-_NUMBER = re.compile(r"[-+\d.]+")
 
 
-def without_numbers(warning: str) -> str:
-    """Text of a warning without its numbers, in which warnings of the same kind on several tests or parts differ."""
-    return _NUMBER.sub("", warning)
-
-
-def consequence_of(warning: str) -> str:
-    """Return the sentence of `uses.toml` that states the consequence of a warning for the use of the numbers."""
-    return next(use for pattern, use in _USES.items() if re.search(pattern, warning))
-
-
-def by_importance(warnings: Iterable[str]) -> list[str]:
-    """Sort warnings by their importance for the use of the numbers, the most important first."""
-    ranked = [
-        (next(rank for rank, pattern in enumerate(_RANKS) if re.search(pattern, consequence_of(warning))), warning)
-        for warning in warnings
-    ]
-    return [warning for _, warning in sorted(ranked, key=lambda pair: pair[0])]
-
-
-def warnings_of(result: Result, predicted: Iterable[Iterable[str]] = (), notes: Iterable[str] = ()) -> list[str]:
+def warnings_of(
+    result: Result, predicted: Iterable[Iterable[Caveat]] = (), notes: Iterable[Caveat] = ()
+) -> list[Caveat]:
     """Collect all warnings for a reader of a result and its predictions, each once.
 
     Args:
@@ -77,44 +39,47 @@ def warnings_of(result: Result, predicted: Iterable[Iterable[str]] = (), notes: 
         notes: further warnings, which come first.
 
     Returns:
-        Sentences.
+        Warnings without repetition.
     """
     return list(dict.fromkeys((*notes, *result.warnings, *chain.from_iterable(predicted), *caveats(result))))
 
 
-def caveats(result: Result) -> list[str]:
+def caveats(result: Result) -> list[Caveat]:
     """List the warnings about a fitted result that apply to every prediction.
 
     Args:
         result: fitted result.
 
     Returns:
-        Sentences: unfitted directions, unresolved effects, and the limits of the model.
+        Warnings: unfitted directions, unresolved effects, and the limits of the model.
     """
-    lines = [line for place in result.fitted_places for line in unfitted_warnings(result, place)]
+    warnings = [warning for place in result.fitted_places for warning in unfitted_warnings(result, place)]
     for name in result.unresolved:
         twins = " or ".join(get_effect(name).twins)
-        lines.append(f"{name} is assigned to the bushing, but these tests cannot distinguish it from {twins}")
-    lines += result.undecided
+        sentence = f"{name} is assigned to the bushing, but these tests cannot distinguish it from {twins}"
+        warnings.append(Caveat("effect_may_be_rig", sentence))
+    warnings += result.undecided
     if "springpot" not in result.model.effects:
-        lines.append("the model has no springpot: its stiffness does not depend on frequency")
+        sentence = "the model has no springpot: its stiffness does not depend on frequency"
+        warnings.append(Caveat("no_springpot", sentence))
     if unnamed := result.model.unnamed:
-        lines.append(
+        sentence = (
             "the unnamed correction follows the measurement, not a law. Outside the measured range, it fades "
             f"and the band widens by up to +/-{number(100.0 * Z95 * unnamed.far_deviation, 2)} %"
         )
-        lines.append(
+        warnings.append(Caveat("correction_fades", sentence))
+        sentence = (
             "the unnamed correction is assigned to the bushing, but these tests cannot distinguish it "
             "from an effect of the rig. If it belongs to the rig, |K| of the bushing in the car differs by up to "
             f"{number(100.0 * unnamed.largest, 2)} %"
         )
+        warnings.append(Caveat("correction_may_be_rig", sentence))
     if result.measured is None:
-        lines.append("the model was not fitted: it has no uncertainty and no fitted range")
+        warnings.append(Caveat("not_fitted", "the model was not fitted: it has no uncertainty and no fitted range"))
     if rig := rig_effects(result):
-        lines.append(
-            f"the prediction leaves out effects that belong to the rig and not to the bushing: {', '.join(rig)}"
-        )
-    return lines
+        sentence = "the prediction leaves out effects that belong to the rig and not to the bushing"
+        warnings.append(Caveat("rig_effects_excluded", f"{sentence}: {', '.join(rig)}"))
+    return warnings
 
 
 def rig_effects(result: Result) -> list[str]:
@@ -128,7 +93,7 @@ def agrees_within_noise(result: Result, direction: Place) -> bool:
     return bool(misfits) and all(test.reduced_chi_square <= _AGREEMENT for test in misfits)
 
 
-def unfitted_warnings(result: Result, direction: Place) -> Iterator[str]:
+def unfitted_warnings(result: Result, direction: Place) -> Iterator[Caveat]:
     """Generate warnings on a predicted direction that was not fitted, or whose formula deviates from finite elements.
 
     Args:
@@ -136,7 +101,7 @@ def unfitted_warnings(result: Result, direction: Place) -> Iterator[str]:
         direction: direction or specimen of the prediction.
 
     Yields:
-        Sentences.
+        Warnings.
     """
     fitted = result.measured.directions if result.measured else ()
     if not fitted:
@@ -149,16 +114,18 @@ def unfitted_warnings(result: Result, direction: Place) -> Iterator[str]:
         is_radial = direction.axis is Direction.RADIAL and corrected.isdisjoint(direction.labels)
         if is_radial and bushing and bushing.shape == "paper":
             error = _radial_error(bushing)
-            yield f"{direction}: fitted with the paper's formula, {error}. The parameters contain this error"
+            sentence = f"fitted with the paper's formula, {error}. The parameters contain this error"
+            yield Caveat("formula_error", sentence).about(direction)
             yield from _compressible(result, bushing, direction)
         return
     of_bushing = direction.axis is Direction.AXIAL and Direction.AXIAL not in axes and not axes.isdisjoint(Direction)
     if not (of_bushing or direction.axis in (Direction.RADIAL, Direction.TORSION)):
         if corrected.isdisjoint(direction.labels):
-            yield (
-                f"{direction}: not fitted, predicted from the {tests} tests. The band excludes errors of the "
+            sentence = (
+                f"not fitted, predicted from the {tests} tests. The band excludes errors of the "
                 "dimensions, and differences between two bodies of one compound"
             )
+            yield Caveat("direction_not_fitted", sentence).about(direction)
         return
     radially = direction.axis is Direction.RADIAL or (Direction.AXIAL not in axes and Direction.RADIAL in axes)
     formula, error = Direction.TORSION, "because the formula replaces the uneven strain by one value"
@@ -167,25 +134,28 @@ def unfitted_warnings(result: Result, direction: Place) -> Iterator[str]:
     if formula in corrected:
         return
     band = f"{'The band excludes' if result.fitted else 'No band includes'} the error of the {formula} formula"
-    agreement = ""
+    kind, agreement = "direction_not_fitted", ""
     if any(test.place == str(direction) for test in result.tests):
-        agrees = agrees_within_noise(result, direction)
-        agreement = f"; the measured sweep {'agrees within' if agrees else 'differs by more than'} its noise"
-    yield f"{direction}: not fitted, predicted from the {tests} tests{agreement}. {band}, {error}"
+        kind, agreement = "direction_not_confirmed", "; the measured sweep differs by more than its noise"
+        if agrees_within_noise(result, direction):
+            kind, agreement = "direction_confirmed", "; the measured sweep agrees within its noise"
+    sentence = f"not fitted, predicted from the {tests} tests{agreement}. {band}, {error}"
+    yield Caveat(kind, sentence).about(direction)
     if radially and bushing:
         yield from _compressible(result, bushing, direction)
 
 
-def _compressible(result: Result, bushing: Bushing, direction: Place) -> Iterator[str]:
+def _compressible(result: Result, bushing: Bushing, direction: Place) -> Iterator[Caveat]:
     """Yield a warning if a bulk modulus of 2 GPa would lower the radial stiffness by more than 1 %."""
     place = direction if direction.axis is Direction.RADIAL else Direction.RADIAL
     decrease = bushing.correction.stiffness_decrease(result.model.values.get("mu", 0.0)) if bushing.correction else 0.0
     if decrease > _NOTED_LOWERING:
         percent = number(100.0 * decrease, 2)
-        yield (
-            f"{place}: the model assumes incompressible rubber; a bulk modulus of 2 GPa would lower "
+        sentence = (
+            "the model assumes incompressible rubber; a bulk modulus of 2 GPa would lower "
             f"the radial stiffness of this shape by {percent} %"
         )
+        yield Caveat("incompressible", sentence).about(place)
 
 
 def _radial_error(bushing: Bushing) -> str:
@@ -216,7 +186,7 @@ def extrapolations(
     amplitude: Array,
     temperature: float | None = None,
     subject: str | None = None,
-) -> Iterator[str]:
+) -> Iterator[Caveat]:
     """Generate warnings for frequencies, strains and a temperature outside of the fitted range.
 
     Args:
@@ -228,7 +198,7 @@ def extrapolations(
         subject: beginning of the warnings; None for the name of the direction.
 
     Yields:
-        Sentences.
+        Warnings.
     """
     if result.measured is None:
         return
@@ -237,14 +207,17 @@ def extrapolations(
         predicted, *ends = (number(kelvin - CELSIUS, 3) for kelvin in (temperature, *tested))
         if not tested[0] - SAME_TEMPERATURE <= temperature <= tested[1] + SAME_TEMPERATURE:
             fitted = f"predicted at {predicted} degC, but fitted at {' to '.join(dict.fromkeys(ends))} degC only"
-            yield f"{subject}: {fitted}: extrapolated by the law of Williams, Landel and Ferry"
+            sentence = f"{fitted}: extrapolated by the law of Williams, Landel and Ferry"
+            yield Caveat("extrapolated_temperature", sentence).about(subject)
     percent = 100.0 * result.model.unit_strain(direction)
-    for axis, unit, digits, values, (low, high) in (
-        ("frequencies", "Hz", 3, frequency, result.measured.frequency),
-        ("strains", "%", 2, percent * amplitude, [100.0 * end for end in result.measured.strain]),
+    fitted_percent = [100.0 * end for end in result.measured.strain]
+    for kind, axis, unit, digits, values, (low, high) in (
+        ("extrapolated_frequency", "frequencies", "Hz", 3, frequency, result.measured.frequency),
+        ("extrapolated_strain", "strains", "%", 2, percent * amplitude, fitted_percent),
     ):
         if values.min() < low * (1 - MARGIN) or values.max() > high * (1 + MARGIN):
             predicted, fitted = (
                 format_range(unit, *ends, digits=digits) for ends in ((values.min(), values.max()), (low, high))
             )
-            yield f"{subject}: predicted at {axis} of {predicted}, but fitted at {fitted} only: {BEYOND}"
+            sentence = f"predicted at {axis} of {predicted}, but fitted at {fitted} only: {BEYOND}"
+            yield Caveat(kind, sentence).about(subject)

@@ -8,6 +8,7 @@ from functools import partial
 
 import numpy as np
 
+from bushfit.caveat import Caveat
 from bushfit.effects.contract import Array, RubberConditions
 from bushfit.errors import ModelError
 from bushfit.geometry import TRANSLATION, Place
@@ -43,7 +44,7 @@ class PredictedResonance:
         amplitude: zero-to-peak deformation of the bushing [m], (n,).
         transmissibility: complex ratio of the accelerations of mass and base [-], (n,).
         stiffness: complex stiffness of the bushing at each frequency and amplitude [N/m], (n,).
-        warnings: sentences on a direction that was not fitted, on frequencies and strains near the peak outside the
+        warnings: warnings on a direction that was not fitted, on frequencies and strains near the peak outside the
             fitted range, and on unresolved effects.
         if_in_rig: response if the unresolved effects belong to the rig, not to the bushing; None without such effects.
     """
@@ -55,7 +56,7 @@ class PredictedResonance:
     amplitude: Array
     transmissibility: Array
     stiffness: Array
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[Caveat, ...] = ()
     if_in_rig: PredictedResonance | None = None
 
     @property
@@ -121,10 +122,10 @@ def predict_resonance(
         peaks = np.array([shaken(model).peak for _, model in alternative_models(result, rig=False)])
         (low, smallest), (high, largest) = peaks.min(axis=0), peaks.max(axis=0)
         span = f"{number(low, 4)} to {number(high, 4)} Hz, |T| {number(smallest, 4)} to {number(largest, 4)}"
-        warnings += [*result.undecided, f"{subject}: {span}, for all models that agree with the tests"]
+        spread = Caveat("resonance_range", f"{span}, for all models that agree with the tests")
+        warnings += [*result.undecided, spread.about(subject)]
     if if_in_rig:
         peak, ratio = (number(value, 4) for value in if_in_rig.peak)
-        warnings.append(
-            f"{subject}: at {peak} Hz, |T| {ratio}, if {' and '.join(result.unresolved)} belongs to the rig"
-        )
+        sentence = f"at {peak} Hz, |T| {ratio}, if {' and '.join(result.unresolved)} belongs to the rig"
+        warnings.append(Caveat("resonance_if_rig", sentence).about(subject))
     return replace(predicted, warnings=tuple(warnings), if_in_rig=if_in_rig)

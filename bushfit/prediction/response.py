@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.fft import next_fast_len
 
+from bushfit.caveat import Caveat
 from bushfit.effects.contract import Array, RubberConditions
 from bushfit.effects.history import History
 from bushfit.effects.unnamed import NAME as UNNAMED
@@ -42,7 +43,7 @@ class TimeResponse:
         force: force [N, N m or Pa] with its 95 % band, (n,).
         unit_strain: equivalent strain per displacement [1/m, 1/rad or 1].
         tested: largest strain [1] and strain rate [1/s] of the fitted tests; None if the model was not fitted.
-        warnings: sentences on extrapolation and on effects that are left out or constant.
+        warnings: warnings on extrapolation and on effects that are left out or constant.
     """
 
     direction: Place
@@ -50,7 +51,7 @@ class TimeResponse:
     force: Band
     unit_strain: float
     tested: tuple[float, float] | None = None
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[Caveat, ...] = ()
 
     @property
     def peak(self) -> float:
@@ -208,7 +209,7 @@ def _tested_strains(result: Result) -> tuple[float, float] | None:
     return result.measured.strain[1], max(2.0 * np.pi * strain * frequency for strain, frequency in ends)
 
 
-def _warnings(result: Result, response: TimeResponse, left_out: list[str], temperature: float | None) -> list[str]:
+def _warnings(result: Result, response: TimeResponse, left_out: list[str], temperature: float | None) -> list[Caveat]:
     """Warnings on a time response: directions and ranges that were not fitted, effects left out, and coarse sampling.
 
     Args:
@@ -217,7 +218,7 @@ def _warnings(result: Result, response: TimeResponse, left_out: list[str], tempe
         left_out: names of the effects that the response leaves out.
         temperature: temperature of the rubber [K]; None for the reference temperature.
     """
-    place, history = response.direction, response.history
+    place, history, of_motion = response.direction, response.history, list[Caveat]()
     warnings = [*result.undecided, *unfitted_warnings(result, place)]
     if result.measured:
         largest = max(np.abs(history.value).max(), result.measured.strain[0] / response.unit_strain)
@@ -226,44 +227,49 @@ def _warnings(result: Result, response: TimeResponse, left_out: list[str], tempe
         rate = (
             f"{number(np.abs(response.strain_rate).max(), 3)} 1/s, but fitted at up to {number(response.tested[1], 3)}"
         )
-        warnings.append(
-            f"{place}: strain rates up to {rate} 1/s only, in {number(100.0 * share, 2)} % of time: {BEYOND}"
-        )
+        sentence = f"strain rates up to {rate} 1/s only, in {number(100.0 * share, 2)} % of time: {BEYOND}"
+        of_motion.append(Caveat("extrapolated_rate", sentence))
     if (result.model.unnamed or result.model_error) and "friction" in result.model.effects:
-        warnings.append(
-            f"{place}: friction laws that agree in sines can differ in a mixed motion by more than the band. Compare "
+        sentence = (
+            "friction laws that agree in sines can differ in a mixed motion by more than the band. Compare "
             "with a fit with --effect distributed_sliders, or with a measured force ([[validation]])"
         )
+        of_motion.append(Caveat("friction_laws_differ", sentence))
     if left_out:
-        warnings.append(f"{place}: {' and '.join(left_out)} left out, because no law describes this motion")
+        sentence = f"{' and '.join(left_out)} left out, because no law describes this motion"
+        of_motion.append(Caveat("effects_without_law", sentence))
     if constant := result.model.constant_modifiers:
         unit, factor = place.display.displacement
         sine = f"{number(history.frequency, 3)} Hz and {number(factor * history.amplitude.item(), 3)} {unit}"
-        warnings.append(f"{place}: {' and '.join(constant)} constant, as in a sine of {sine}")
+        of_motion.append(Caveat("constant_effects", f"{' and '.join(constant)} constant, as in a sine of {sine}"))
     strokes, (unit, factor) = np.abs(history.turning.strides), place.display.displacement
     start = abs(float(history.value[0]))
     if not history.periodic and start > _JUMP * np.abs(np.diff(history.value)).max():
-        warnings.append(
-            f"{place}: the history begins at {number(factor * start, 3)} {unit}, but the model starts from rest at 0. "
+        sentence = (
+            f"the history begins at {number(factor * start, 3)} {unit}, but the model starts from rest at 0. "
             "Begin the history at rest, or subtract its first value"
         )
+        of_motion.append(Caveat("motion_begins_off_zero", sentence))
     shortest = 2.0 * (1.0 - MARGIN) * result.measured.strain[0] / response.unit_strain if result.measured else 0.0
     short = strokes[strokes < shortest].sum() / max(strokes.sum(), np.finfo(float).tiny)
     if np.mean(strokes < _NOISE * np.ptp(history.value)) > _MOST_NOISE:
         noise, highest = noise_and_highest_frequency(history.value, history.step)
-        warnings.append(
-            f"{place}: most reversals of the displacement are as small as its noise, {number(factor * noise, 2)} "
+        sentence = (
+            f"most reversals of the displacement are as small as its noise, {number(factor * noise, 2)} "
             f"{unit} rms, and friction follows each of them. To smooth the displacement and keep the motion, "
             f'use --lowpass "{number(2.0 * highest, 2)} Hz"'
         )
+        of_motion.append(Caveat("noisy_motion", sentence))
     elif short > _MOST_SHORT:
-        warnings.append(
-            f"{place}: {number(100.0 * short, 2)} % of the travel is in strokes shorter than the shortest tested, "
+        sentence = (
+            f"{number(100.0 * short, 2)} % of the travel is in strokes shorter than the shortest tested, "
             f"{number(factor * shortest / (1.0 - MARGIN), 3)} {unit}: {BEYOND}"
         )
+        of_motion.append(Caveat("extrapolated_stroke", sentence))
     if not history.periodic and (samples := 1.0 / (history.frequency * history.step)) < _FEWEST_PER_CYCLE:
-        warnings.append(
-            f"{place}: the history has {number(samples, 2)} samples in a mean cycle, too few for the force between "
+        sentence = (
+            f"the history has {number(samples, 2)} samples in a mean cycle, too few for the force between "
             "samples: sample it more finely"
         )
-    return warnings
+        of_motion.append(Caveat("coarse_motion", sentence))
+    return [*warnings, *(warning.about(place) for warning in of_motion)]

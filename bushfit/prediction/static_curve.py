@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bushfit.caveat import Caveat
 from bushfit.effects.contract import Array, RubberConditions
 from bushfit.effects.history import History
 from bushfit.effects.unnamed import NAME as UNNAMED
@@ -38,7 +39,7 @@ class StaticCurve:
             m/rad or Pa].
         secant: static stiffness from end to end, (1,) [N/m, N m/rad or Pa].
         rate: rate of the motion [m/s, rad/s or 1/s].
-        warnings: sentences on extrapolation, and on alternatives without a law in time.
+        warnings: warnings on extrapolation, and on alternatives without a law in time.
         preload: preload at which displacement and force are zero; None unless this direction was tested at several
             preloads.
     """
@@ -51,7 +52,7 @@ class StaticCurve:
     slope: Band
     secant: Band
     rate: float
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[Caveat, ...] = ()
     preload: Preload | None = None
 
     @property

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from bushfit.caveat import Caveat
 from bushfit.effects import Level
 from bushfit.effects.contract import Array, RubberConditions
 from bushfit.errors import ModelError
@@ -53,7 +54,7 @@ class Prediction:
         stiffness: magnitude |K| [N/m, N m/rad or, of a specimen with a strain amplitude, Pa].
         loss_factor: K''/K' [1].
         storage_stiffness, loss_stiffness: K' and K'', in the unit of |K|.
-        warnings: sentences on directions, frequencies and strains that were not fitted, on excluded effects of the rig,
+        warnings: warnings on directions, frequencies and strains that were not fitted, on excluded effects of the rig,
             and on unresolved effects.
         if_in_rig: prediction if the unresolved effects belong to the rig, not to the bushing; the bands include it.
             None without unresolved effects.
@@ -71,7 +72,7 @@ class Prediction:
     loss_factor: Band
     storage_stiffness: Band
     loss_stiffness: Band
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[Caveat, ...] = ()
     if_in_rig: Prediction | None = None
     measured: Array | None = None
     preload: Preload | None = None
@@ -161,7 +162,7 @@ def predict(
 
 def point_warnings(
     result: Result, prediction: Prediction, temperature: float | None, preload: Preload | None
-) -> Iterator[str]:
+) -> Iterator[Caveat]:
     """Generate the warnings on a prediction: unfitted directions and ranges, effects of the rig, unresolved effects.
 
     Args:
@@ -171,7 +172,7 @@ def point_warnings(
         preload: requested preload; None if none is requested.
 
     Yields:
-        Sentences.
+        Warnings.
     """
     place, measured, stiffness = prediction.direction, prediction.measured, prediction.stiffness.value
     yield from result.undecided
@@ -191,14 +192,16 @@ def point_warnings(
         percent = format_deviation(stiffness / np.abs(measured))
         loss_difference = prediction.loss_factor.value - measured.imag / measured.real
         ends = [number(end, 2, "+") for end in (np.nanmin(loss_difference), np.nanmax(loss_difference))]
-        yield (
-            f"{place}: without {' and '.join(rig)} the predicted stiffness is {percent}, and the predicted loss factor "
+        sentence = (
+            f"without {' and '.join(rig)} the predicted stiffness is {percent}, and the predicted loss factor "
             f"{' to '.join(ends)}, compared with the measured values"
         )
+        yield Caveat("rig_difference", sentence).about(place)
     if prediction.if_in_rig and not np.allclose(prediction.if_in_rig.stiffness.value, stiffness, rtol=_SAME):
         percent = format_deviation(prediction.if_in_rig.stiffness.value / stiffness)
         names = " and ".join(result.unresolved)
-        yield f"{place}: stiffness {percent} if {names} belongs to the rig; the band, low to high, includes both"
+        sentence = f"stiffness {percent} if {names} belongs to the rig; the band, low to high, includes both"
+        yield Caveat("stiffness_if_rig", sentence).about(place)
 
 
 def tested_preload(result: Result, place: Place, preload: Preload | None) -> Preload | None:

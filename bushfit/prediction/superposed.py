@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bushfit.caveat import Caveat
 from bushfit.effects import Level
 from bushfit.effects.contract import Array, RubberConditions
 from bushfit.effects.history import History
@@ -151,16 +152,16 @@ def untimed_effects(model: Model) -> list[str]:
 
 def timed_candidates(
     result: Result, subject: str, *, rig: bool = False
-) -> tuple[list[tuple[Result, Model]], list[str]]:
+) -> tuple[list[tuple[Result, Model]], list[Caveat]]:
     """List the models that agree with the tests and have laws in time: the fitted model, then its alternatives.
 
     Args:
         result: fitted result.
-        subject: beginning of the sentence on alternatives, such as the direction.
+        subject: beginning of the warning on alternatives, such as the direction.
         rig: True to include the effects of the rig, as in the tests.
 
     Returns:
-        Pairs of a model and the result that contains its errors; and a sentence on alternatives that are left out, if
+        Pairs of a model and the result that contains its errors; and a warning on alternatives that are left out, if
         any.
 
     Raises:
@@ -169,5 +170,6 @@ def timed_candidates(
     result.model.without(Level.INSTRUMENT, UNNAMED).require_time_law()
     models = candidates(result, rig=rig)
     untimed = sorted({name for _, model in models for name in untimed_effects(model)})
-    sentence = f"{subject}: the band excludes the alternative with {' or '.join(untimed)}, which has no law in time"
-    return [(source, model) for source, model in models if not untimed_effects(model)], [sentence] * bool(untimed)
+    sentence = f"the band excludes the alternative with {' or '.join(untimed)}, which has no law in time"
+    warnings = [Caveat("alternative_without_law", sentence).about(subject)] if untimed else []
+    return [(source, model) for source, model in models if not untimed_effects(model)], warnings

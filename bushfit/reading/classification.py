@@ -8,6 +8,7 @@ from difflib import get_close_matches
 import numpy as np
 
 from bushfit import units
+from bushfit.caveat import Caveat
 from bushfit.errors import NoColumnError
 from bushfit.reading.headers import (
     ROLE_SETS,
@@ -102,7 +103,8 @@ def classify(
     for column in (roles[role] for role in stated_units if role in roles):
         written = parse_unit(split_unit(column.header)[1] or table.layout.units[column.index])[0]
         if written != column.unit and units.is_compatible(written, column.unit or ""):
-            notes.append(f'"{column.header}" is read in the stated unit {column.unit}, not in {written} of the header')
+            sentence = f'"{column.header}" is read in the stated unit {column.unit}, not in {written} of the header'
+            notes.append(Caveat("stated_unit", sentence))
     if {"force_amplitude", "stiffness"} & set(roles) and "amplitude" not in roles:
         notes += add_motion_as_amplitude(table, roles, stated_units)
     if "damping_coefficient" in roles and "stiffness" in roles and "stiffness" not in columns:
@@ -117,8 +119,8 @@ def classify(
     return replace(table, roles=roles, notes=tuple(notes), clocks=clocks)
 
 
-def _columns_beside_mean(table: Table, roles: Mapping[str, Column]) -> list[str]:
-    """Sentence on numbered columns, such as those of repeats, that are not read beside their mean."""
+def _columns_beside_mean(table: Table, roles: Mapping[str, Column]) -> list[Caveat]:
+    """Warnings on numbered columns, such as those of repeats, that are not read beside their mean."""
     used = {index for column in roles.values() for index in column.indices}
     stems = {without_mean(split_unit(column.header)[0]): column.header for column in roles.values()}
     matches = ((header, _NUMBERED.fullmatch(split_unit(header)[0].strip())) for header in table.headers)
@@ -128,9 +130,10 @@ def _columns_beside_mean(table: Table, roles: Mapping[str, Column]) -> list[str]
         if match and index not in used and (stem := plain(match[1])) in stems
     ]
     means = dict.fromkeys(mean for _, mean in free)
+    lists = {mean: ", ".join(header for header, one in free if one == mean) for mean in means}
     return [
-        f'{", ".join(header for header, one in free if one == mean)} are left out beside their mean "{mean}"'
-        for mean in means
+        Caveat("columns_beside_mean", f'{listed} are left out beside their mean "{mean}"')
+        for mean, listed in lists.items()
     ]
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from bushfit.caveat import Caveat
 from bushfit.errors import MeasurementError, error_location
 from bushfit.geometry import TRANSLATION, Direction, Place, Specimen, get_places
 from bushfit.reading.finding import find_table
@@ -34,14 +35,14 @@ class DisplacementHistory:
         displacement: displacement [m, rad or 1], (n,).
         step: time between samples [s].
         start: time of the first sample [s].
-        notes: sentences on how the file was read, and on corrections.
+        notes: warnings on how the file was read, and on corrections.
     """
 
     direction: Place
     displacement: Floats
     step: float
     start: float = 0.0
-    notes: tuple[str, ...] = ()
+    notes: tuple[Caveat, ...] = ()
 
     @property
     def time(self) -> Floats:
@@ -101,7 +102,7 @@ def read_displacements(
     values, notes = table.read(wanted, fewest_rows=FEWEST_ROWS)
     if rate:
         time = np.arange(next(iter(values.values())).size) / rate
-        more: tuple[str, ...] = (note,)
+        more: tuple[Caveat, ...] = (Caveat("rate_from_header", note),)
     else:
         time, more = increasing_time(table.needing(wanted), wanted["time"], values["time"])
     with error_location(table.file, "time"):
@@ -119,17 +120,17 @@ def read_displacements(
     )
 
 
-def even_time(time: Floats) -> tuple[Floats, tuple[str, ...]]:
+def even_time(time: Floats) -> tuple[Floats, tuple[Caveat, ...]]:
     """Space the times of a record evenly.
 
     Returns:
-        Even times [s], (n,); and a sentence if the recorded times deviate from them by more than rounding.
+        Even times [s], (n,); and a warning if the recorded times deviate from them by more than rounding.
 
     Raises:
         MeasurementError: the times are too uneven, or too many.
     """
     even = np.linspace(time[0], time[-1], time.size)
-    steps, correction = np.diff(time), tuple[str, ...]()
+    steps, correction = np.diff(time), tuple[Caveat, ...]()
     step = float(np.median(steps))
     if np.any(np.abs(time - even) > _ROUNDING * step):
         count = round((time[-1] - time[0]) / step) + 1
@@ -143,12 +144,14 @@ def even_time(time: Floats) -> tuple[Floats, tuple[str, ...]]:
         even = np.linspace(time[0], time[-1], count)
         rows = np.round(steps / step).astype(int)
         gaps = rows > 1
-        reason = f"the time steps are {steps.min():.3g} to {steps.max():.3g} s"
+        kind, reason = "resampled", f"the time steps are {steps.min():.3g} to {steps.max():.3g} s"
         if gaps.any():
             longest = f"the longest gap is {steps.max():.3g} s from {time[steps.argmax()]:.6g} s"
             missing = rows[gaps].sum() - gaps.sum()
             reason = f"{missing} rows are missing, {longest}" if missing > 1 else f"1 row is missing, {longest}"
-        correction = (f"{reason}: resampled evenly at {1.0 / step:.6g} Hz by linear interpolation",)
+            kind = "rows_missing"
+        sentence = f"{reason}: resampled evenly at {1.0 / step:.6g} Hz by linear interpolation"
+        correction = (Caveat(kind, sentence),)
     if even.size > _MOST_ROWS:
         raise MeasurementError("the history is too long", found=f"{even.size} rows", expected=f"up to {_MOST_ROWS}")
     return even, correction

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from bushfit import units
+from bushfit.caveat import Caveat
 from bushfit.geometry import ROTATION, STRAINING, TRANSLATION
 from bushfit.reading.headers import (
     LOOP_COLUMNS,
@@ -44,7 +45,7 @@ _STRAINS = [name for name in map(plain, WORDS["straining"]["displacement"]) if l
 _BY_UNIT = {role: kind for role, _, kind in (entry.partition(" ") for entry in ROLE_SETS["by_unit"])}
 
 
-def add_by_unit(table: Table, roles: dict[str, Column]) -> tuple[list[str], list[Column]]:
+def add_by_unit(table: Table, roles: dict[str, Column]) -> tuple[list[Caveat], list[Column]]:
     """Recognise columns by their unit and words in their name, and add them to the known columns.
 
     A column is added if no other column has such a unit, apart from set points and means. Frequency, amplitude and
@@ -55,7 +56,7 @@ def add_by_unit(table: Table, roles: dict[str, Column]) -> tuple[list[str], list
         roles: columns found so far, by role such as "force"; changed in place.
 
     Returns:
-        A sentence on each added column, and the columns that are still unknown.
+        A warning on each added column, and the columns that are still unknown.
     """
     if len(roles) + len(table.headers) < 3:
         return [], []
@@ -99,7 +100,7 @@ def add_by_unit(table: Table, roles: dict[str, Column]) -> tuple[list[str], list
             roles[role] = replace(fitting[0], role=role)
             del free[fitting[0]]
             header = f'"{fitting[0].header}"' if fitting[0].header else f"column {fitting[0].index + 1}"
-            notes.append(f"{header} is read as the {role.replace('_', ' ')} by its unit")
+            notes.append(Caveat("column_by_unit", f"{header} is read as the {role.replace('_', ' ')} by its unit"))
     if "time" in names and "time" not in roles:
         stamps = [column for column in free if clock(str(table.first_row[column.index])) is not None]
         roles |= {"time": replace(stamps[0], role="time")} if len(stamps) == 1 else {}
@@ -108,7 +109,7 @@ def add_by_unit(table: Table, roles: dict[str, Column]) -> tuple[list[str], list
 
 def add_half_differences(
     table: Table, roles: dict[str, Column], extremes: Mapping[tuple[str, Extreme], Column]
-) -> list[str]:
+) -> list[Caveat]:
     """Use half the difference of maxima and minima as an amplitude, and add it to the known columns.
 
     A column of peaks, read as an amplitude, contains maxima if another column of the same name contains valleys.
@@ -119,7 +120,7 @@ def add_half_differences(
         extremes: columns of maxima and minima, by the role of their amplitude.
 
     Returns:
-        A sentence on each pair of columns, with their mean, which is the preload.
+        A warning on each pair of columns, with their mean, which is the preload.
     """
     notes = []
     for role in ("amplitude", "force_amplitude"):
@@ -137,17 +138,17 @@ def add_half_differences(
             note += (
                 f"; their mean is {units.number(mean, 3)} {high.unit or ''}, which is a preload if the zero is right"
             )
-        notes.append(note)
+        notes.append(Caveat("column_difference", note))
     return notes
 
 
-def name_parallel_spring(roles: dict[str, Column]) -> list[str]:
+def name_parallel_spring(roles: dict[str, Column]) -> list[Caveat]:
     """Read the stiffness beside a damping coefficient as K' if its name is the bare symbol k or c, else as |K*|.
 
     k and c, or c and d, are the symbols of a spring and a dashpot in parallel; K is also a symbol of |K*|.
 
     Returns:
-        A sentence on the choice, unless the symbol of the stiffness states it.
+        A warning on the choice, unless the symbol of the stiffness states it.
     """
     stiffness, loss = roles["stiffness"], roles["damping_coefficient"]
     if "*" in stiffness.header or "|" in stiffness.header or {*roles} & ROLE_SETS["losses"] != {"damping_coefficient"}:
@@ -157,7 +158,8 @@ def name_parallel_spring(roles: dict[str, Column]) -> list[str]:
         roles["storage_stiffness"] = replace(roles.pop("stiffness"), role="storage_stiffness")
         meaning, alternative = "the stiffness K' of a spring in parallel", "stiffness"
     choice = f'columns = {{ {alternative} = "{stiffness.header}" }} in the campaign reads the other'
-    return [f'"{stiffness.header}" beside the damping "{loss.header}" is read as {meaning}; {choice}']
+    sentence = f'"{stiffness.header}" beside the damping "{loss.header}" is read as {meaning}; {choice}'
+    return [Caveat("spring_and_dashpot", sentence)]
 
 
 def moves_along(table: Table, first: Column, second: Column) -> bool:
@@ -183,7 +185,7 @@ def moves_along(table: Table, first: Column, second: Column) -> bool:
     return float(np.min(np.corrcoef(numbers.T))) > _ALONG
 
 
-def add_motion_as_amplitude(table: Table, roles: dict[str, Column], stated_units: Mapping[str, str]) -> list[str]:
+def add_motion_as_amplitude(table: Table, roles: dict[str, Column], stated_units: Mapping[str, str]) -> list[Caveat]:
     """Use a column that is named like a displacement as the amplitude of a sweep, and add it to the known columns.
 
     The table must have a force amplitude, or the name must be a symbol, such as x. A stiffness, if there is one, must
@@ -195,7 +197,7 @@ def add_motion_as_amplitude(table: Table, roles: dict[str, Column], stated_units
         stated_units: units as the user states them, by role.
 
     Returns:
-        A sentence on the added column; empty without one.
+        A warning on the added column; empty without one.
     """
     motions = Vocabulary({"amplitude": [*LOOP_COLUMNS["displacement"], *_SYMBOLS]}, {})
     candidates = [
@@ -218,4 +220,4 @@ def add_motion_as_amplitude(table: Table, roles: dict[str, Column], stated_units
             return []
     roles["amplitude"] = fitting[0]
     reason = "because the file has the amplitude of the force, too" if has_force else "by its unit"
-    return [f'"{fitting[0].header}" is read as the amplitude, {reason}']
+    return [Caveat("column_as_amplitude", f'"{fitting[0].header}" is read as the amplitude, {reason}')]

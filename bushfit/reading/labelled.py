@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from bushfit.caveat import Caveat
 from bushfit.reading.headers import SWEEP_COLUMNS, WORDS, Vocabulary
 from bushfit.reading.measurement import Floats
 from bushfit.reading.names import named_direction
@@ -188,18 +189,18 @@ def select_rows(table: Table, labels: Mapping[str, tuple[int, Sequence[str]]], w
 
 def note_not_understood(
     table: Table, labels: Mapping[str, tuple[int, Sequence[str]]], rows: NDArray[np.intp] | None, *settled: Floats
-) -> Iterator[str]:
-    """Sentences on columns that may distinguish several tests in one file but whose meaning is not known.
+) -> Iterator[Caveat]:
+    """Warnings on columns that may distinguish several tests in one file but whose meaning is not known.
 
     Args:
         table: table with all rows.
         labels: columns that assign rows to tests, see `find_labels`.
         rows: indices of the rows that were read, (n,); None for all.
         settled: frequency and nominal amplitude of these rows, (n,) each; none for a loop. Numbers that are constant at
-            each operating point, and texts that are constant at each frequency or amplitude, need no sentence.
+            each operating point, and texts that are constant at each frequency or amplitude, need no warning.
 
     Yields:
-        One sentence for each such column.
+        One warning for each such column.
     """
     understood = {index for key, (index, texts) in labels.items() if key != "direction" or len({*texts}) == 1}
     unclear = [
@@ -219,8 +220,9 @@ def note_not_understood(
         if counts.size > 1 and not explained and not (is_number and counts.min() < _FEWEST_ROWS):
             values = sorted(texts.distinct[code] for code in present)
             listed = ", ".join(values[:4]) + ", ..." * (len(values) > 4)
-            yield (
+            yield Caveat(
+                "column_not_understood",
                 f'"{header}" (column {index + 1}) varies from row to row ({listed}) and is not understood: all rows '
                 "are one test, with equal points as repeats. To select rows, write "
-                f'rows = {{ "{header}" = "{values[0]}" }} in the campaign'
+                f'rows = {{ "{header}" = "{values[0]}" }} in the campaign',
             )

@@ -18,6 +18,7 @@ from typing import Annotated, Literal, NamedTuple
 from pydantic import BeforeValidator
 
 from bushfit import units
+from bushfit.caveat import Caveat
 from bushfit.reading.headers import WORDS, Vocabulary, plain, split_convention, split_unit
 from bushfit.reading.numerals import is_like_number
 from bushfit.reading.roles import is_test, is_unit_alone, stated_once
@@ -112,7 +113,7 @@ class Layout:
         written: original header cells of a wide table that name a quantity; `headers` belong to the long table.
         numbered: True if all rows begin with a number after a # ("#1"), so that # does not mark a comment.
         headerless: True if the table has no header.
-        notes: sentences on columns that are left out or filled.
+        notes: warnings on columns that are left out or filled.
         levels: indices of columns, such as the amplitude, that are empty if they have the value of the row above.
     """
 
@@ -124,7 +125,7 @@ class Layout:
     written: tuple[str, ...] = ()
     numbered: bool = False
     headerless: bool = False
-    notes: tuple[str, ...] = ()
+    notes: tuple[Caveat, ...] = ()
     levels: frozenset[int] = frozenset()
 
     @property
@@ -201,7 +202,8 @@ def find_layout(
         tests = (one for one in below if one[0][1] and is_test(vocabulary.roles(one[3])))
         for _, index, delimiter, headers in tests:
             layout = _layout(lines, vocabulary, index, delimiter, headers)
-            note = f"lines {lines[0].number} to {lines[index].number - 1} contain another table, which is left out"
+            sentence = f"lines {lines[0].number} to {lines[index].number - 1} contain another table, which is left out"
+            note = Caveat("other_table", sentence)
             return replace(layout, notes=(*layout.notes, note))
     best = max(candidates, key=lambda candidate: candidate[0], default=None)
     if best is None:
@@ -371,7 +373,7 @@ def _layout(
     )
     levels = stated_once(headers, (split(content, delimiter) for content in contents), vocabulary)
     names = ", ".join(f'"{headers[index]}"' for index in sorted(levels))
-    notes = (f"{names}: an empty cell has the value of the cell above",) if levels else ()
+    notes = (Caveat("cells_filled", f"{names}: an empty cell has the value of the cell above"),) if levels else ()
     return Layout(delimiter, tuple(headers), number, tuple(row), units_line, (), numbered, False, notes, levels)
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from bushfit.caveat import Caveat
 from bushfit.geometry import Place
 from bushfit.reading.finding import find_table
 from bushfit.reading.headers import LOOP_COLUMNS, Column
@@ -73,15 +74,16 @@ def read_loop(
         if copies.size and all(np.array_equal(x[copies], x[copies - 1]) for x in values.values()):
             values = {role: np.delete(numbers, copies) for role, numbers in values.items()}
             left_out = f"{copies.size} row{'s' * (copies.size > 1)} equal to the row before"
-            notes += (f"left out: {left_out}, with the same time",)
+            notes += (Caveat("repeated_rows", f"left out: {left_out}, with the same time"),)
             displacement, force = values["displacement"], values["force"]
         time, more = increasing_time(table, wanted["time"], values["time"])
         notes = (*notes, *more)
     else:
         time = test.rebuild_time(displacement)
-        notes += (note,) if stated_rate else ()
+        notes += (Caveat("rate_from_header", note),) if stated_rate else ()
         if "time" in table.roles:
-            notes += (f'"{table.roles["time"].header}" is not used, because the campaign states the time',)
+            sentence = f'"{table.roles["time"].header}" is not used, because the campaign states the time'
+            notes += (Caveat("unused_time", sentence),)
     unknown = note_not_understood(table, table.row_labels, selected)
     temperature = mean_temperature(degrees) if test.temperature is None else test.temperature
     return Loop(
@@ -155,7 +157,7 @@ def time_column(table: Table, place: Place) -> Column:
     return si_column(table, "time", place)
 
 
-def increasing_time(table: Table, column: Column, time: Floats) -> tuple[Floats, tuple[str, ...]]:
+def increasing_time(table: Table, column: Column, time: Floats) -> tuple[Floats, tuple[Caveat, ...]]:
     """Correct a recorded time so that it increases from row to row.
 
     Clock times continue after midnight, and rounded times that repeat are spread evenly.
@@ -166,7 +168,7 @@ def increasing_time(table: Table, column: Column, time: Floats) -> tuple[Floats,
         time: time as recorded [s], (n,).
 
     Returns:
-        Time [s], (n,), and a sentence if repeated times were spread.
+        Time [s], (n,), and a warning if repeated times were spread.
 
     Raises:
         MeasurementError: the time decreases or is constant, or its unit is in doubt.
@@ -189,7 +191,8 @@ def increasing_time(table: Table, column: Column, time: Floats) -> tuple[Floats,
     stuck = time[1:] <= time[:-1]
     if stuck.any() and (even := spread(time)) is not None:
         rate = (time.size - 1) / (even[-1] - even[0])
-        return even, (f'"{column.header}" is rounded and repeats: its rows are spread evenly, at {rate:.6g} Hz',)
+        sentence = f'"{column.header}" is rounded and repeats: its rows are spread evenly, at {rate:.6g} Hz'
+        return even, (Caveat("rows_spread", sentence),)
     steps = np.diff(time)[~stuck]
     rate = f"{1.0 / np.median(steps):.6g} Hz" if steps.size else "... Hz"
     hint = f'if the rows are evenly spaced, sampling_rate = "{rate}" in the campaign replaces this column; '

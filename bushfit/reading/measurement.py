@@ -11,6 +11,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from bushfit.caveat import Caveat
 from bushfit.errors import MeasurementError
 from bushfit.geometry import Place
 from bushfit.reading.preload import Preload
@@ -37,16 +38,16 @@ class Source:
         file: path of the test file, as the campaign gives it.
         sha256: SHA-256 of the file in hexadecimal digits.
         conditions: conditions of the test that no fit uses, such as preload and date, by their keys in the campaign.
-        notes: sentences on how the file was read, such as columns that were not understood and rows left out.
+        notes: warnings on how the file was read, such as columns that were not understood and rows left out.
     """
 
     file: Path
     sha256: str
     conditions: Mapping[str, str | float] = field(default_factory=dict)
-    notes: tuple[str, ...] = ()
+    notes: tuple[Caveat, ...] = ()
 
-    def with_note(self, note: str) -> Source:
-        """Return the provenance with a further sentence on how the file was read."""
+    def with_note(self, note: Caveat) -> Source:
+        """Return the provenance with a further warning on how the file was read."""
         return replace(self, notes=(*self.notes, note))
 
 

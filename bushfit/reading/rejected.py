@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bushfit import units
+from bushfit.caveat import Caveat
 from bushfit.errors import MeasurementError, UnitError
 from bushfit.reading.headers import ROLE_SETS, WORDS, Column, Vocabulary, parse_unit, plain, split_unit
 from bushfit.reading.layout import is_row, is_summary_row
@@ -77,15 +78,15 @@ def begins_other_table(cells: Sequence[str]) -> bool:
     return len(filled) > 1 and len(in_brackets) > 0 and not any(map(is_like_number, filled))
 
 
-def note_left_out(table: Table, rows: Sequence[FaultyRow], count: int) -> Iterator[str]:
-    """Sentence on rows that are left out because they are not data, except repeated headers and rows of units.
+def note_left_out(table: Table, rows: Sequence[FaultyRow], count: int) -> Iterator[Caveat]:
+    """Warning on rows that are left out because they are not data, except repeated headers and rows of units.
 
     Args:
         rows: the rows that are left out.
         count: number of rows of data.
 
     Yields:
-        One sentence if there are such rows.
+        One warning if there are such rows.
 
     Raises:
         MeasurementError: so many of these rows look like data that the meaning of the table is in doubt.
@@ -110,7 +111,8 @@ def note_left_out(table: Table, rows: Sequence[FaultyRow], count: int) -> Iterat
             for line, cells, _ in left_out[:_MOST_LISTED]
         ]
         more = ", ..." if len(left_out) > _MOST_LISTED else ""
-        yield f"{len(left_out)} row{'s' * (len(left_out) > 1)} left out, without data: {', '.join(listed)}{more}"
+        rows_text = f"{len(left_out)} row{'s' * (len(left_out) > 1)}"
+        yield Caveat("rows_left_out", f"{rows_text} left out, without data: {', '.join(listed)}{more}")
 
 
 def _broken_rows(table: Table, rows: Sequence[FaultyRow]) -> list[tuple[int, int]]:

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BeforeValidator, Field, ValidationInfo
 
+from bushfit.caveat import Caveat
 from bushfit.errors import CampaignError, error_location
 from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Direction, Place, Specimen
 from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS, AmplitudeConvention
@@ -178,13 +179,13 @@ class TestFile(FileFormat):
     operator: Text | None = None
     specimen_number: Text | None = None
 
-    def source(self, sha256: str, temperature: float | None, notes: Iterable[str]) -> Source:
+    def source(self, sha256: str, temperature: float | None, notes: Iterable[Caveat]) -> Source:
         """Create the provenance of the test.
 
         Args:
             sha256: SHA-256 of the file in hexadecimal digits.
             temperature: temperature of the test [K], which is reported in degC; None if it is not known.
-            notes: sentences on how the file was read.
+            notes: warnings on how the file was read.
 
         Returns:
             File, checksum, notes, and the conditions that are copied to the results.

@@ -7,6 +7,7 @@ from collections.abc import Collection, Mapping
 import numpy as np
 
 from bushfit import units
+from bushfit.caveat import Caveat
 from bushfit.reading.headers import WORDS, Column, Vocabulary
 from bushfit.reading.measurement import Complex, Floats
 from bushfit.reading.roles import AGREEING_PAIRS, OF_MOTION, PAIRS
@@ -85,7 +86,7 @@ def refuse_ambiguous_damping(table: Table) -> None:
 
 def with_positive_loss(
     values: Mapping[str, Floats], columns: Mapping[str, Column], test: SweepFile
-) -> tuple[dict[str, Floats], tuple[str, ...]]:
+) -> tuple[dict[str, Floats], tuple[Caveat, ...]]:
     """Correct the sign of a loss that is negative throughout, and the range of a phase.
 
     Args:
@@ -94,7 +95,7 @@ def with_positive_loss(
         test: table [[sweeps]] of the campaign; its force_sign and phase_sign are None for an automatic correction.
 
     Returns:
-        Corrected values in SI by role, and a sentence on each automatic correction.
+        Corrected values in SI by role, and a warning on each automatic correction.
 
     Notes:
         A phase is wrapped to -180 to 180 deg. If its median magnitude is above 90 deg, the force has the opposite sign,
@@ -105,13 +106,11 @@ def with_positive_loss(
         header = columns["phase"].header
         if np.abs(phase).max() > np.pi * (1.0 + 1e-9):
             phase = np.angle(np.exp(1j * phase))
-            notes.append(f'"{header}" exceeds 180 deg and is wrapped')
+            notes.append(Caveat("phase_wrapped", f'"{header}" exceeds 180 deg and is wrapped'))
         automatic = test.force_sign is None and np.median(np.abs(phase)) > np.pi / 2.0
         if automatic:
-            notes.append(
-                f'"{header}" exceeds 90 deg: the force has the opposite sign, and the phase is turned by 180 deg; '
-                "force_sign = 1 in the campaign keeps it"
-            )
+            sentence = f'"{header}" exceeds 90 deg: the force has the opposite sign, and the phase is turned by 180 deg'
+            notes.append(Caveat("force_turned", f"{sentence}; force_sign = 1 in the campaign keeps it"))
         corrected["phase"] = np.angle(-np.exp(1j * phase)) if automatic or test.force_sign == -1 else phase
     size = np.median(values.get("storage_stiffness", values.get("stiffness", np.ones(1))))
     sizes = {"loss_stiffness": size, "loss_compliance": np.median(values.get("storage_compliance", np.ones(1)))}
@@ -122,10 +121,8 @@ def with_positive_loss(
         share = corrected[role] / sizes.get(role, 1.0)
         automatic = test.phase_sign is None and np.mean(share < -LEAST_LOSS_FACTOR) > _THROUGHOUT
         if automatic:
-            notes.append(
-                f'"{columns[role].header}" is negative throughout and is read with the opposite sign; '
-                "phase_sign = 1 in the campaign keeps it"
-            )
+            sentence = f'"{columns[role].header}" is negative throughout and is read with the opposite sign'
+            notes.append(Caveat("loss_turned", f"{sentence}; phase_sign = 1 in the campaign keeps it"))
         corrected[role] = -corrected[role] if automatic or test.phase_sign == -1 else corrected[role]
     return corrected, tuple(notes)
 

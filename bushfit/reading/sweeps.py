@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bushfit import units as si
+from bushfit.caveat import Caveat
 from bushfit.geometry import Place, strain_factor_of_files
 from bushfit.reading.finding import find_table
 from bushfit.reading.headers import SWEEP_COLUMNS, ZERO_TO_PEAK, AmplitudeConvention, Column
@@ -82,7 +83,8 @@ def read_sweep(
     check_positive(table, columns, values)
     if "amplitude" in columns and columns["amplitude"].role == "acceleration":
         values["amplitude"] /= (2.0 * np.pi * values["frequency"]) ** 2
-        notes += (f'"{columns["amplitude"].header}" is an acceleration: its amplitude is divided by (2 pi f)^2',)
+        sentence = f'"{columns["amplitude"].header}" is an acceleration: its amplitude is divided by (2 pi f)^2'
+        notes += (Caveat("acceleration_converted", sentence),)
     for role, value in constants.items():
         if role in columns:
             table.refuse(

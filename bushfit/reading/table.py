@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bushfit import units
+from bushfit.caveat import Caveat
 from bushfit.errors import MeasurementError
 from bushfit.geometry import TRANSLATION, Motion
 from bushfit.reading.headers import Column, Vocabulary
@@ -65,7 +66,7 @@ class Table:
         names: usual column names by role, before adaptation to the motion.
         motion: kind of motion: translation, rotation or strain.
         roles: recognised columns, by role such as "force".
-        notes: sentences on columns that were recognised only by their unit.
+        notes: warnings on columns that were recognised only by their unit.
         selected: positions of the rows of the test in `all_rows`, from 0; None for all rows.
         needed: indices of columns that must contain a number; a row without one is not a row of data.
         clocks: indices of columns that contain times as texts, such as 20:07:10.
@@ -78,7 +79,7 @@ class Table:
     names: Mapping[str, Sequence[str]] = field(default_factory=dict)
     motion: Motion = TRANSLATION
     roles: Mapping[str, Column] = field(default_factory=dict, kw_only=True)
-    notes: tuple[str, ...] = field(default=(), kw_only=True)
+    notes: tuple[Caveat, ...] = field(default=(), kw_only=True)
     selected: frozenset[int] | None = field(default=None, kw_only=True)
     needed: frozenset[int] = field(default=frozenset(), kw_only=True)
     clocks: frozenset[int] = field(default=frozenset(), kw_only=True)
@@ -275,25 +276,28 @@ class Table:
         return labels_and_text_above(self.lines_above)
 
     @cached_property
-    def remarks(self) -> tuple[str, ...]:
-        """Sentences on lines above the table, marked rows and hidden rows that may change what the test means."""
+    def remarks(self) -> tuple[Caveat, ...]:
+        """Warnings on lines above the table, marked rows and hidden rows that may change what the test means."""
         remarks = ((line.number, line.text[:_LONGEST_QUOTE]) for line in self.lines_above if is_remark(line.text))
-        sentences = [f'line {number} is not understood: "{text}"' for number, text in remarks]
+        warnings = [Caveat("remark", f'line {number} is not understood: "{text}"') for number, text in remarks]
         rows = [] if all(is_like_number(str(cell)) for cell in self.first_row) else self.first_rows
         texts = Counter(cell for row in rows for cell in row if isinstance(cell, str) and cell[:1].isalpha())
-        sentences += [
-            f'{count} rows are marked "{cell[:_LONGEST_QUOTE]}"' for cell, count in texts.items() if is_remark(cell)
+        warnings += [
+            Caveat("marked_rows", f'{count} rows are marked "{cell[:_LONGEST_QUOTE]}"')
+            for cell, count in texts.items()
+            if is_remark(cell)
         ]
         if hidden := [number for number in self.source.hidden if number > self.layout.header_line]:
-            sentences.append(f"{len(hidden)} rows from row {hidden[0]} on are hidden in the workbook, but are read")
-        return tuple(sentences)
+            sentence = f"{len(hidden)} rows from row {hidden[0]} on are hidden in the workbook, but are read"
+            warnings.append(Caveat("hidden_rows", sentence))
+        return tuple(warnings)
 
     def agrees(self, role: str, expected: str) -> bool:
         """True if a column has a role such as "force", and a unit with the dimension of the unit `expected`."""
         column = self.roles.get(role)
         return column is not None and units.is_compatible(column.unit or "1", expected)
 
-    def read(self, wanted: Mapping[str, Column], *, fewest_rows: int) -> tuple[dict[str, Floats], tuple[str, ...]]:
+    def read(self, wanted: Mapping[str, Column], *, fewest_rows: int) -> tuple[dict[str, Floats], tuple[Caveat, ...]]:
         """Read columns, and list the rows that are left out.
 
         Args:
@@ -301,7 +305,7 @@ class Table:
             fewest_rows: smallest number of rows that is accepted.
 
         Returns:
-            Values in SI by role, (n,) each, and sentences on rows left out and on columns recognised by their unit.
+            Values in SI by role, (n,) each, and warnings on rows left out and on columns recognised by their unit.
 
         Raises:
             MeasurementError: ambiguous numbers, too few rows, or so many rows without data that the meaning of the

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from bushfit import units
+from bushfit.caveat import Caveat
 from bushfit.errors import MeasurementError
 from bushfit.reading.blocks import find_segments
 from bushfit.reading.headers import COUNTED, AmplitudeConvention, Vocabulary, split_convention
@@ -134,7 +135,10 @@ def unpivot(source: RowSource, layout: Layout, file: Path, vocabulary: Vocabular
         return None
     sheet, long_layout = _long_table(columns, source, file, vocabulary)
     summaries = dict.fromkeys(text for text in texts if is_summary_row([text]))
-    notes = tuple(f'the column "{text}" is left out, because it summarizes other columns' for text in summaries)
+    notes = tuple(
+        Caveat("summary_column", f'the column "{text}" is left out, because it summarizes other columns')
+        for text in summaries
+    )
     written = tuple(text for text in texts if any(m.role or m.stepped for m in _read_corner(text, vocabulary)))
     return sheet, replace(long_layout, delimiter=mark, written=written, notes=notes)
 

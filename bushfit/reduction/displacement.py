@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bushfit.caveat import Caveat
 from bushfit.errors import MeasurementError, error_location
 from bushfit.reading.displacements import FEWEST_ROWS, DisplacementHistory, even_time
 from bushfit.reading.measurement import Loop
@@ -114,7 +115,9 @@ def _moving_channels(channels: Sequence[DisplacementHistory]) -> list[Displaceme
     still = [channel.direction for channel in channels if not np.ptp(channel.displacement)]
     if len(still) == len(channels):
         raise MeasurementError(no_motion, place=", ".join(map(str, still)), expected="displacements that change")
-    notes = tuple(f"{place}: left out, because the displacement is constant" for place in still)
+    notes = tuple(
+        Caveat("still_channel", "left out, because the displacement is constant").about(place) for place in still
+    )
     return [replace(channel, notes=(*channel.notes, *notes)) for channel in channels if channel.direction not in still]
 
 
@@ -126,7 +129,8 @@ def _without_offset(channel: DisplacementHistory, *, steady: bool) -> Displaceme
     offset = float(motion.mean() if steady else motion[0])
     unit, factor = channel.direction.display.displacement
     datum = "mean" if steady else "first value"
-    note = f"{channel.direction}: {number(factor * offset, 4)} {unit}, the {datum}, is subtracted as an offset"
+    sentence = f"{number(factor * offset, 4)} {unit}, the {datum}, is subtracted as an offset"
+    note = Caveat("offset_subtracted", sentence).about(channel.direction)
     return replace(channel, displacement=motion - offset, notes=(*channel.notes, note))
 
 
@@ -176,7 +180,6 @@ def _smooth_displacement(channel: DisplacementHistory, frequency: float, *, stea
         smooth = np.asarray(sosfiltfilt(sections, motion, padlen=extension))
     unit, factor = channel.direction.display.displacement
     removed = number(factor * float(np.std(motion - smooth)), 2)
-    cut_off = f"{channel.direction}: low-passed at {number(frequency, 3)} Hz without delay"
-    return replace(
-        channel, displacement=smooth, notes=(*channel.notes, f"{cut_off}, which removes {removed} {unit} rms")
-    )
+    sentence = f"low-passed at {number(frequency, 3)} Hz without delay, which removes {removed} {unit} rms"
+    note = Caveat("low_passed", sentence).about(channel.direction)
+    return replace(channel, displacement=smooth, notes=(*channel.notes, note))

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bushfit.caveat import Caveat
 from bushfit.errors import MeasurementError
 from bushfit.reading.measurement import Complex, Floats, Sweep
 from bushfit.reading.resonance import ResonanceTest
@@ -72,26 +73,25 @@ class Resonance:
         return Sweep(test.name, test.direction, *points, source=test.source, stepped=None, relative_error=error)
 
     @property
-    def warnings(self) -> tuple[str, ...]:
-        """Sentences on omitted points, the sign of the phases, and a resonance that the test did not reach."""
-        sentences = []
+    def warnings(self) -> tuple[Caveat, ...]:
+        """Warnings on omitted points, the sign of the phases, and a resonance that the test did not reach."""
+        warnings = []
         omitted, total = self.left_out, self.left_out.size + self.frequency.size
         if omitted.size:
-            sentences.append(
+            sentence = (
                 f"{omitted.size} of {total} points left out, {omitted.min():.4g} to {omitted.max():.4g} Hz: the "
                 f"standard error of K exceeds {100 * LARGEST_ERROR:g} % there, because mass and base "
                 "move almost equally"
             )
+            warnings.append(Caveat("points_left_out", sentence))
         if self.turned:
-            sentences.append(
-                "the phases of this file have the opposite sign: read with the sign that makes the loss positive"
-            )
+            sentence = "the phases of this file have the opposite sign: read with the sign that makes the loss positive"
+            warnings.append(Caveat("phases_turned", sentence))
         frequency, largest = self.peak
         if frequency in (self.test.frequency[0], self.test.frequency[-1]):
-            sentences.append(
-                f"no resonance: |T| is largest, {largest:.3g}, at the end of the sweep ({frequency:.4g} Hz)"
-            )
-        return tuple(sentences)
+            sentence = f"no resonance: |T| is largest, {largest:.3g}, at the end of the sweep ({frequency:.4g} Hz)"
+            warnings.append(Caveat("no_resonance", sentence))
+        return tuple(warnings)
 
 
 def transmissibility(stiffness: Complex, mass: float, frequency: Floats) -> Complex:

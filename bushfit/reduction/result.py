@@ -8,6 +8,7 @@ from typing import Required
 import numpy as np
 from typing_extensions import TypedDict
 
+from bushfit.caveat import Caveat
 from bushfit.geometry import Place
 from bushfit.units import display_unit, number
 
@@ -27,6 +28,7 @@ class ReductionDocument(TypedDict, total=False):
         specimen: tested specimen; missing for a bushing.
         points: columns of sweep.csv by header, one entry for each operating point.
         warnings: warnings on the use of the numbers.
+        warning_kinds: kind of each warning, as in bushfit/caveat.toml.
         campaign: text of the [[sweeps]] table for a campaign.
         mass_kg: mass on the mount [kg]; only for a resonance test, like the next two keys.
         resonance_Hz: frequency of the largest transmissibility [Hz].
@@ -37,6 +39,7 @@ class ReductionDocument(TypedDict, total=False):
     specimen: str
     points: Required[dict[str, list[float | str | None]]]
     warnings: Required[list[str]]
+    warning_kinds: Required[list[str]]
     campaign: Required[str]
     mass_kg: float
     resonance_Hz: float
@@ -119,18 +122,20 @@ class Reduction:
     outliers: int = 0
 
     @property
-    def warnings(self) -> tuple[str, ...]:
+    def warnings(self) -> tuple[Caveat, ...]:
         """Warnings on outliers, negative losses, means, levels, sampling, distortion, and parts without a point."""
-        steps, sentences = self.steps, list[str]()
+        steps, warnings = self.steps, list[Caveat]()
         unit, factor = self.direction.display.displacement
         if self.outliers:
-            sentences.append(f"{self.outliers} row{'s' * (self.outliers > 1)} far from their neighbours left out")
+            sentence = f"{self.outliers} row{'s' * (self.outliers > 1)} far from their neighbours left out"
+            warnings.append(Caveat("outlying_rows", sentence))
         if negative := [step for step in steps if step.stiffness.imag < 0.0]:
-            sentences.append(
+            sentence = (
                 f"{len(negative)} of {len(steps)} points have a loss factor below zero, the first at "
                 f"{negative[0].frequency:.4g} Hz: is the force or the displacement recorded late?"
             )
-        sentences += preload_warnings(steps, self.direction)
+            warnings.append(Caveat("negative_loss", sentence))
+        warnings += preload_warnings(steps, self.direction)
         # the steepest d ln|K| / d ln X between neighbouring levels at one frequency
         ordered = sorted(steps, key=lambda step: (step.nominal_frequency, step.amplitude))
         slopes = [
@@ -143,34 +148,38 @@ class Reduction:
             miss = np.array([step.amplitude / level - 1.0 for step in steps if step.level == level])
             if np.abs(miss).max() > MISSED_LEVEL:
                 low, high = (factor * level * (1.0 + end) for end in (miss.min(), miss.max()))
-                sentences.append(
+                sentence = (
                     f"the rig reached {low:.4g} to {high:.4g} {unit} instead of {factor * level:.4g} {unit}: "
                     f"this changes |K| by up to {number(100 * steepest * np.abs(miss).max(), 2)} % (fits use the "
                     "reached amplitude)"
                 )
+                warnings.append(Caveat("missed_level", sentence))
         if coarse := [step for step in steps if step.rows_per_cycle < _FEW_ROWS_PER_CYCLE]:
             worst = min(coarse, key=lambda step: step.rows_per_cycle)
-            sentences.append(
+            sentence = (
                 f"{len(coarse)} of {len(steps)} points have fewer than {_FEW_ROWS_PER_CYCLE} rows per cycle "
                 f"({worst.rows_per_cycle:.3g} at {worst.frequency:.4g} Hz): harmonics above half the sampling rate "
                 "may fold onto the fundamental"
             )
+            warnings.append(Caveat("coarse_sampling", sentence))
         if bent := [step for step in steps if step.displacement_distortion > 0.02]:  # rigs in order have less
             worst = max(bent, key=lambda step: step.displacement_distortion)
-            sentences.append(
+            sentence = (
                 f"the displacement is not a clean sine at {len(bent)} of {len(steps)} points: up to "
                 f"{number(100 * worst.displacement_distortion, 2)} % harmonic distortion ({worst.frequency:.4g} Hz, "
                 f"{factor * worst.amplitude:.3g} {unit})"
             )
+            warnings.append(Caveat("distorted_motion", sentence))
         rejected = [skip for skip in self.skipped if skip.steady]
         for skip in rejected[:_MOST_LISTED]:
-            sentences.append(f"{skip.name}, {skip.start:.4g} to {skip.end:.4g} s gives no point: {skip.why}")
+            sentence = f"{skip.name}, {skip.start:.4g} to {skip.end:.4g} s gives no point: {skip.why}"
+            warnings.append(Caveat("no_point", sentence))
         if len(rejected) > _MOST_LISTED:
-            sentences.append(f"{len(rejected) - _MOST_LISTED} more parts give no point")
-        return tuple(sentences)
+            warnings.append(Caveat("more_without_point", f"{len(rejected) - _MOST_LISTED} more parts give no point"))
+        return tuple(warnings)
 
 
-def preload_warnings(steps: Sequence[Step], direction: Place) -> list[str]:
+def preload_warnings(steps: Sequence[Step], direction: Place) -> list[Caveat]:
     """Warning on a preload: a mean displacement or force that is too large for the zero offset of a sensor.
 
     Args:
@@ -178,7 +187,7 @@ def preload_warnings(steps: Sequence[Step], direction: Place) -> list[str]:
         direction: direction or specimen of the steps.
 
     Returns:
-        One sentence, or an empty list without a preload.
+        One warning, or an empty list without a preload.
     """
     (motion, force, _), units = direction.motion.words, direction.display
     means = []
@@ -191,4 +200,4 @@ def preload_warnings(steps: Sequence[Step], direction: Place) -> list[str]:
             ends = dict.fromkeys(number(factor * end, 3) for end in sorted((min(values), max(values)), key=abs))
             means.append(f"a mean {word} of {' to '.join(ends)} {written}")
     about = f"recorded about {' and '.join(means)}; the points refer to this mean: state it as the preload of the sweep"
-    return [about] if means else []
+    return [Caveat("mean_load", about)] if means else []

@@ -4,6 +4,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from bushfit.caveat import Caveat, to_caveats
+
 #: Value of the key `schema`, which names the layout of the file.
 BATCH_SCHEMA: Literal["bushfit/batch/2"] = "bushfit/batch/2"
 #: Result of the comparison of a part with its limits.
@@ -50,6 +52,7 @@ class PartTable:
         deviations: quantities by which the part differs beyond chance, in standard deviations of the others.
         differs: text on these quantities, relative to the median of the other parts.
         warnings: warnings of the fit and of the predictions.
+        warning_kinds: kind of each warning, as in bushfit/caveat.toml.
         labels: further texts in the table row of the part, by column.
         values: values of the part, in the order of `quantities`; null if not known.
         curve: measured stiffness, in the order of `curve_points`.
@@ -65,9 +68,15 @@ class PartTable:
     deviations: Mapping[str, float]
     differs: str
     warnings: Sequence[str]
+    warning_kinds: Sequence[str] = ()
     labels: Mapping[str, str]
     values: Sequence[float | None]
     curve: Sequence[float] | None
+
+    @property
+    def caveats(self) -> list[Caveat]:
+        """Warnings with their kinds."""
+        return to_caveats(self.warnings, self.warning_kinds)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,6 +98,7 @@ class BatchFile:
         differ: names of the parts that differ from the others.
         headline: outcome in one sentence.
         warnings: warnings on the batch, the important ones first.
+        warning_kinds: kind of each warning, as in bushfit/caveat.toml.
         detectable: smallest deviation of an outlying part, in standard deviations; null below five parts.
         quantities: scatter, limits and capability of each quantity, by column of the table.
         curve_points: names of the columns of the batch table with the measured stiffness at each frequency.
@@ -109,6 +119,7 @@ class BatchFile:
     differ: Sequence[str]
     headline: str
     warnings: Sequence[str]
+    warning_kinds: Sequence[str] = ()
     detectable: float | None
     quantities: Mapping[str, QuantityTable]
     curve_points: Sequence[str]

@@ -144,6 +144,7 @@ class ComparisonFile:
         warnings: warnings on the use of the numbers.
         command: command line; empty if the comparison was made from Python.
         versions: versions of bushfit and of the numerical packages, by name.
+        warning_kinds: kind of each warning, as in bushfit/caveat.toml.
     """
 
     schema: SchemaName
@@ -154,6 +155,7 @@ class ComparisonFile:
     warnings: Sequence[str]
     command: str
     versions: Mapping[str, str]
+    warning_kinds: Sequence[str] = ()
 
     @property
     def names(self) -> dict[str, str]:

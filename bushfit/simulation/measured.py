@@ -12,6 +12,7 @@ import numpy as np
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.session import planned_session
 from bushfit.campaign.simulated import SimulatedLoop, SimulatedSweep, SimulatedTest, SimulateSettings
+from bushfit.caveat import Caveat
 from bushfit.effects.contract import Array, RubberConditions
 from bushfit.geometry import Specimen
 from bushfit.model.model import Model
@@ -52,7 +53,7 @@ class Simulated:
     @property
     def result(self) -> Result:
         """True model in the form of a fitted result, without uncertainty."""
-        note = "simulated: the values a rig simulation was given, not a fit"
+        note = Caveat("simulated", "simulated: the values a rig simulation was given, not a fit")
         return Result(self.truth, warnings=(note,), specimens=self.specimens)
 
     def campaign(self) -> Campaign:

@@ -86,9 +86,9 @@ def test_limits_of_every_kind_and_of_the_scatter_of_the_batch(tmp_path):
     assert notes == []
     by_sigma = limits(tmp_path, "[parameters.mu]\nsigma = 3\n")
     few = resolve_limits(by_sigma, {"mu": np.array([1.0, 2.0, np.nan])})
-    assert "2 parts, fewer than at_least = 10" in few[1][0]
+    assert "2 parts, fewer than at_least = 10" in few[1][0].text
     same = resolve_limits(by_sigma, {"mu": np.ones(12)})
-    assert "have exactly the same value" in same[1][0]
+    assert "have exactly the same value" in same[1][0].text
     assert few[0] == same[0] == {"mu": (-math.inf, math.inf)}
 
 

@@ -114,10 +114,10 @@ def test_predictions_use_it_inside_the_range_and_open_outside(result):
     unnamed = result.model.unnamed
     half_far = (far.stiffness.high - far.stiffness.low) / 2.0 / far.stiffness.value
     assert half_far == pytest.approx([unnamed.largest], rel=0.05)
-    told = " ".join(line for line in caveats(result) if line.startswith("the unnamed correction"))
+    told = " ".join(line for line in map(str, caveats(result)) if line.startswith("the unnamed correction"))
     percent = [float(figure) for figure in re.findall(r"up to (?:\+/-)?([\d.]+) %", told)]
     assert percent == pytest.approx([196.0 * unnamed.far_deviation, 100.0 * unnamed.largest], rel=0.05)
-    assert any("extrapolated" in line for line in far.warnings)
+    assert any("extrapolated" in line for line in map(str, far.warnings))
 
 
 def covered(campaign: Campaign, *truths: Array) -> list[float]:
@@ -149,7 +149,7 @@ def test_bands_hold_each_model_that_may_be_right(measured):
         alone = predict(own, Direction.RADIAL, FREQUENCIES, AMPLITUDES).stiffness
         assert np.all((band.low <= alone.low) & (alone.high <= band.high)), "with the errors of its own fit"
         assert 0.0 < np.median((alone.high - alone.value) / alone.value) < 0.02
-    assert any("the bands, low to high, include each alternative" in line for line in caveats(result))
+    assert any("the bands, low to high, include each alternative" in line for line in map(str, caveats(result)))
     document = json.loads(json.dumps(to_document(result)))
     assert complaints("model", document, whole=False) == []
     again = from_document(document)

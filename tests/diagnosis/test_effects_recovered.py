@@ -73,7 +73,7 @@ def test_a_small_effect_is_not_taken_for_one_at_rest_on_its_bound(measured, name
     campaign = measured({effect: {key: SMALL[name]}}, seed=1)
     result = joint_fit(campaign, effects=(*BASE, effect), directions=BOTH)
     interval = result.interval(name)
-    assert not any("edge" in line for line in result.warnings)
+    assert not any("edge" in line for line in map(str, result.warnings))
     assert interval[0] <= SMALL[name] <= interval[1]
 
 

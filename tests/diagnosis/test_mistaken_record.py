@@ -75,12 +75,12 @@ def test_a_mistake_is_named_with_the_line_that_puts_it_right(truth, measured):
     # nothing is mended: the model to use is that of the tests as they are, and says so
     assert diagnosis.result.model is diagnosis.before.model
     assert not diagnosis.added
-    assert any("fitted to the tests as they are" in warning for warning in diagnosis.result.warnings)
+    assert any("fitted to the tests as they are" in warning for warning in map(str, diagnosis.result.warnings))
     mended = asked(campaign, adopt=tuple(truth.split()))
     assert mended.verdict == "consistent"
     assert mended.calibration[0] == pytest.approx(after, rel=1e-6)
-    assert [line for line in mended.notes if line.startswith("corrected by --adopt ")]
-    assert [line for line in mended.result.warnings if line.startswith("corrected by --adopt ")]
+    assert [line for line in map(str, mended.notes) if line.startswith("corrected by --adopt ")]
+    assert [line for line in map(str, mended.result.warnings) if line.startswith("corrected by --adopt ")]
 
 
 #: Factors of the stated displacement and force, by the mistake in a test that strains rubber beyond all limits.

@@ -237,7 +237,7 @@ def test_rows_that_are_missing_do_not_change_the_frequency(paper_model, waveform
     assert prepared.amplitude == pytest.approx(AMPLITUDE, rel=5e-3)
     if hole[1] - hole[0] > 0.4:
         (note,) = prepared.notes
-        assert "rows are missing" in note
+        assert "rows are missing" in note.text
 
 
 def frequency_found(waveform: str, phase: Array) -> float:
@@ -288,7 +288,7 @@ def test_the_true_model_leaves_only_noise_of_the_steady_cycles(paper_model, case
     prepared = prepare_loop(recorded(paper_model, *RUN_INS[case]))
     gap = float(np.sqrt(np.mean(np.square(prepared.relative(paper_model)))))
     (note,) = prepared.notes
-    assert "left out" in note
+    assert "left out" in note.text
     assert prepared.frequency == pytest.approx(1.0 / PERIOD, rel=2e-3)
     assert prepared.amplitude == pytest.approx(AMPLITUDE, rel=1e-2)
     assert prepared.cycles == pytest.approx(round(prepared.cycles * 4) / 4, abs=0.05)

@@ -116,7 +116,7 @@ def test_all_temperatures_are_fitted_at_once(clean, truth):
     for seed in range(SEEDS):
         data = PreparedCampaign.from_campaign(measure(clean, replace(PLAN, seed=seed)).campaign())
         result = fit_joint(data, effects=(*BASE, "temperature"))
-        assert not [line for line in result.warnings if "degC" in line]
+        assert not [line for line in map(str, result.warnings) if "degC" in line]
         low, high = result.interval("temperature.shift") or (0.0, 0.0)
         off.append(result.model.values["temperature.shift"] / VALUES["temperature.shift"] - 1.0)
         inside += low < VALUES["temperature.shift"] < high

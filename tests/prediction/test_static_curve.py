@@ -149,9 +149,9 @@ def test_a_vanishing_motion_changes_nothing_and_the_band_is_that_of_the_harmonic
         for end in ("value", "low", "high"):
             values = [getattr(getattr(prediction, name), end) for prediction in (alone, over)]
             np.testing.assert_allclose(*values, rtol=2e-3)
-    assert not any("large motion" in line for line in (*alone.warnings, *over.warnings))
+    assert not any("large motion" in line for line in map(str, (*alone.warnings, *over.warnings)))
     large = predict(result, *grid, over=LargeMotion(2e-3, "m", 0.5))
-    told = [line for line in large.warnings if line.startswith("axial, with the large motion: predicted at")]
+    told = [line for line in map(str, large.warnings) if line.startswith("axial, with the large motion: predicted at")]
     assert [("frequencies of 0.5 Hz" in line, "strains of" in line) for line in told] == [(True, False), (False, True)]
 
 

@@ -127,6 +127,6 @@ def test_a_softening_is_told_of_each_part(paper_model):
     loops = split_record(virgin(recorded(paper_model, *[cycles(5, x) for x in (0.2, 0.5, 1)]), 0.12))
     found = [100.0 * (loop.softening or 0.0) for loop in loops]
     assert found == pytest.approx([12.0] * 3, abs=4.0)  # with what a springpot and friction make from rest
-    assert any("stiffer than the last (Mullins)" in note for note in prepare_loop(loops[1]).notes)
+    assert any("stiffer than the last (Mullins)" in note for note in map(str, prepare_loop(loops[1]).notes))
     (one,) = split_record(virgin(recorded(paper_model, cycles(5, 1)), 0.12))
     assert one.softening == pytest.approx(0.12, abs=0.03)

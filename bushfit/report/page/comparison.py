@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from bushfit.caveat import to_caveats
 from bushfit.report import plots
 from bushfit.report.compare_document import ComparisonFile
 from bushfit.report.compared import (
@@ -70,7 +71,7 @@ def comparison_page(comparison: ComparisonFile, chart: ResultFile | None = None)
         "chance": format_p_value,
         "pictures": pictures,
         "tabled": [*value_rows(differences)][: 2 * _ROWS],
-        "warnings": group_warnings(comparison.warnings),
+        "warnings": group_warnings(to_caveats(comparison.warnings, comparison.warning_kinds)),
         "files": [(f"{', '.join(letters)}: {file}", sha256) for (file, sha256), letters in labels.items()],
     }
     return render_page("compare.html", context)

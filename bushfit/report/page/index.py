@@ -7,7 +7,6 @@ from urllib.parse import quote
 
 import numpy as np
 
-from bushfit.prediction.caveats import without_numbers
 from bushfit.report import plots
 from bushfit.report.batch_document import BatchFile, PartTable
 from bushfit.report.page import render_page
@@ -63,13 +62,13 @@ def index_page(batch: BatchFile, folder: Path, base: str = "") -> str:
     chosen = first + [ordinary[index] for index in spread_indices(len(ordinary), max(0, row_limit - len(first)))]
     rows, warnings = list[tuple[Any, ...]](), dict[str, list[tuple[str, str]]]()
     for part in (parts[index] for index in chosen):
-        for line in part.warnings:
-            warnings.setdefault(without_numbers(line), []).append((part.name, line))
+        for warning in part.caveats:
+            warnings.setdefault(warning.kind, []).append((part.name, warning.text))
     numbers = {kind: number for number, kind in enumerate(warnings, start=1)}
     for index in chosen:
         is_known = has_curves and np.isfinite(relative[index]).all()
         mean = 100.0 * np.expm1(np.log1p(relative[index]).mean()) if is_known else None
-        notes = sorted({numbers[without_numbers(line)] for line in parts[index].warnings})
+        notes = sorted({numbers[warning.kind] for warning in parts[index].caveats})
         curve, drawn = (lines[index].tolist() if is_known else [] for lines in (relative, heights))
         rows.append((parts[index], links[index], curve, drawn, mean, notes))
     pictures = []
@@ -98,11 +97,11 @@ def index_page(batch: BatchFile, folder: Path, base: str = "") -> str:
 
 
 def summarize_warnings(named: Sequence[tuple[str, str]]) -> str:
-    """Summarise warnings that differ only in their numbers: parts, first warning, and the number of other texts.
+    """Summarise warnings of one kind: parts, first warning, and the number of other texts.
 
     Args:
         named: name of the part and text of each warning.
     """
     names, lines = (list(dict.fromkeys(column)) for column in zip(*named, strict=True))
-    more = f" (and {len(lines) - 1} more with other numbers)" if len(lines) > 1 else ""
+    more = f" (and {len(lines) - 1} more of this kind)" if len(lines) > 1 else ""
     return f"{names[0] if len(names) == 1 else f'{len(names)} parts'}: {lines[0]}{more}"

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 
+from bushfit.caveat import Caveat, to_caveats
 from bushfit.diagnosis.document import DiagnosisFile
 from bushfit.diagnosis.record import format_odds
 from bushfit.errors import ModelError
@@ -17,7 +19,7 @@ from bushfit.geometry import STRAINING, TRANSLATION
 from bushfit.model.document import CampaignTable
 from bushfit.model.file import from_document, require_schema
 from bushfit.model.result import Result
-from bushfit.prediction.caveats import agrees_within_noise, by_importance, consequence_of, warnings_of
+from bushfit.prediction.caveats import agrees_within_noise, warnings_of
 from bushfit.prediction.stiffness import Prediction
 from bushfit.report import plots
 from bushfit.report.page import render_page
@@ -83,7 +85,8 @@ def report_page(files: Sequence[ResultFile], date: str | None = None, folder: Pa
     by_name, tests = predict_tables(result, tables, tested.get("sweeps")), campaign.tests if campaign else ()
     predictions = [*by_name.values()][:_MOST_PLACES]
     place_warnings = [prediction.warnings for prediction in by_name.values()]
-    warnings = warnings_of(result, place_warnings, diagnosis["warnings"] if diagnosis else ())
+    notes = to_caveats(diagnosis["warnings"], diagnosis.get("warning_kinds", ())) if diagnosis else ()
+    warnings = warnings_of(result, place_warnings, notes)
     charts = {file.name: file for file in files if file.kind == "figure"}
     pictures, left_out = draw_figures(result, diagnosis, tested, by_name, charts)
     sizes = [p.stiffness.value for p in predictions if p.direction.motion is TRANSLATION]
@@ -168,15 +171,15 @@ def draw_figures(
     return pictures, len(pictures) < len(figures) or len(predictions) > _MOST_PLACES
 
 
-def group_warnings(warnings: Iterable[str]) -> dict[str, list[str]]:
+def group_warnings(warnings: Iterable[Caveat]) -> dict[str, list[Caveat]]:
     """Group warnings that have the same consequence for the use of the numbers.
 
     Returns:
         Warnings by the sentence that states their consequence, the most important first.
     """
-    groups = dict[str, list[str]]()
-    for warning in by_importance(warnings):
-        groups.setdefault(consequence_of(warning), []).append(warning)
+    groups = dict[str, list[Caveat]]()
+    for warning in sorted(warnings, key=attrgetter("rank")):
+        groups.setdefault(warning.consequence, []).append(warning)
     return groups
 
 

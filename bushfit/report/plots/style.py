@@ -24,6 +24,7 @@ from matplotlib.font_manager import fontManager
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
+from bushfit.caveat import Caveat
 from bushfit.effects.contract import Array
 from bushfit.errors import printable
 from bushfit.model.covariance import Z95
@@ -330,12 +331,12 @@ def name_levels(
     bar.outline.set(edgecolor=GREY, linewidth=0.6)
 
 
-def warnings_note(sentences: Sequence[str]) -> str:
+def warnings_note(warnings: Sequence[Caveat]) -> str:
     """Join the first warnings, up to about 600 letters, into the note below a figure; the others are counted."""
-    ends = np.cumsum([len(sentence) for sentence in sentences])
+    ends = np.cumsum([len(warning.text) for warning in warnings])
     count = max(int(np.searchsorted(ends, _MOST_LETTERS)), 1)
-    more = len(sentences) - count
-    texts = [sentence[0].upper() + sentence[1:] for sentence in sentences[:count]]
+    more = len(warnings) - count
+    texts = [warning.text[0].upper() + warning.text[1:] for warning in warnings[:count]]
     return ". ".join([*texts, *([f"And {more} more warnings, in the model file and the report"] if more > 0 else [])])
 
 
