@@ -72,11 +72,19 @@ def describe_loop(loop: Loop, labels: Labels) -> Findings:
         "noise": noise + correlation_text(prepared) * (prepared.noise <= half_force),
     }
     if means := recorded_means(prepared):
-        at_mean_force = amplitude * abs(mean_force) / half_force
-        is_position = len(means) > 1 and abs(mean_motion) > _MOST_SOFTENING * at_mean_force
-        facts["preload"] = means[-1 if is_position else 0].text(loop.direction)
+        # without a mean force, a mean displacement may be a preload after which the force was set to zero
+        at_mean_force = amplitude * (abs(mean_force) / half_force if len(means) > 1 else 1.0)
+        is_position = abs(mean_motion) > _MOST_SOFTENING * at_mean_force
+        if len(means) > 1 or not is_position:
+            facts["preload"] = means[-1 if is_position else 0].text(loop.direction)
     odd = odd_recording(loop, labels, [frequency], [amplitude, half_motion], [half_force / amplitude])
     odd += odd_cycles(prepared)
+    if means and "preload" not in facts:
+        position = means[0].text(loop.direction, 3)
+        odd.append(
+            f"a mean {names[0]} of {position} without a mean {names[1]} is taken for the position of the actuator; "
+            f'if it is a preload, state preload = "{position}" in the campaign'
+        )
     if prepared.cycles < 1.5 and abs(mean_motion) > 0.9 * half_motion:
         sentence = (
             f"one loading and unloading from {number(to_length * loop.displacement[0], 3)} {length}: a static curve is "

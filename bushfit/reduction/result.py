@@ -170,7 +170,9 @@ class Reduction:
                 f"{factor * worst.amplitude:.3g} {unit})"
             )
             warnings.append(Caveat("distorted_motion", sentence))
-        rejected = [skip for skip in self.skipped if skip.steady]
+        longest = max((step.end - step.start for step in steps), default=0.0)
+        # a stretch longer than every step is no ramp
+        rejected = [skip for skip in self.skipped if skip.steady or skip.end - skip.start > longest]
         for skip in rejected[:_MOST_LISTED]:
             sentence = f"{skip.name}, {skip.start:.4g} to {skip.end:.4g} s gives no point: {skip.why}"
             warnings.append(Caveat("no_point", sentence))

@@ -103,6 +103,15 @@ def test_cycles_are_between_rests(typed, tmp_path, count, sets, rest, shape, noi
     assert any("more of the same amplitude and rate are not" in sentence for sentence in odd)
 
 
+def test_slow_cycles_before_a_stepped_sine_are_listed(typed, tmp_path):
+    phase = np.concatenate([np.arange(0.0, 3.0, 0.002), np.arange(0.0, 20.0, 0.04)])
+    time, motion = 0.02 * np.arange(phase.size), np.sin(2.0 * np.pi * phase)
+    record(tmp_path / "axial.csv", time, motion, 500.0 * motion + np.gradient(motion, time))
+    assert any(
+        "gives no point: 2 cycles of 0.1 Hz, fewer than 3" in text for text in inspected(typed, "axial.csv")["odd"]
+    )
+
+
 @pytest.mark.parametrize("kind", ["ripple", "rest"])
 def test_a_fit_is_the_same_with_a_ripple_or_after_a_rest(bushfit, work, own, kind):
     time, motion, force = measured(own)

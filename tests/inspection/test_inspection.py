@@ -123,6 +123,9 @@ LOOP_FAULTS: dict[str, Callable[[Loop], Loop]] = {
     "recorded about a mean displacement of 0.1 mm, but no preload is stated": lambda x: replace(
         x, displacement=x.displacement + 1e-4
     ),
+    "a mean displacement of 152 mm without a mean force is taken for the position of the actuator": lambda x: replace(
+        x, displacement=x.displacement + 0.152
+    ),
     "recorded about a mean force of 820 N, but no preload is stated": lambda x: replace(x, force=x.force + 820.0),
     "state force_sign = -1 in the campaign": lambda x: replace(x, force=-x.force),
 }
