@@ -81,10 +81,11 @@ def describe_loop(loop: Loop, labels: Labels) -> Findings:
     odd += odd_cycles(prepared)
     if means and "preload" not in facts:
         position = means[0].text(loop.direction, 3)
-        odd.append(
+        sentence = (
             f"a mean {names[0]} of {position} without a mean {names[1]} is taken for the position of the actuator; "
             f'if it is a preload, state preload = "{position}" in the campaign'
         )
+        odd.append(Caveat("mean_motion", sentence))
     if prepared.cycles < 1.5 and abs(mean_motion) > 0.9 * half_motion:
         sentence = (
             f"one loading and unloading from {number(to_length * loop.displacement[0], 3)} {length}: a static curve is "
