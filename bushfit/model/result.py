@@ -339,13 +339,18 @@ class Result:
         """Warning that the tests do not rule out other models, in a list; empty if they do."""
         if not self.alternatives:
             return []
-        added = (sorted(set(alternative.model.effects) - {*self.model.effects}) for alternative in self.alternatives)
-        names = list(dict.fromkeys(" + ".join(alternative) for alternative in added if alternative))
-        choice = "cannot distinguish between" if len(names) > 1 else "do not show whether the model lacks"
-        used = "a smooth correction instead" if self.model.unnamed else "the plain model"
-        lacking = f"the tests {choice} {' and '.join(names)}: the prediction uses {used}, and"
-        open_values = "the tests permit other values of the parameters:"
-        sentence = f"{lacking if names else open_values} the bands, low to high, include each alternative"
+        shares = dict[str, float]()
+        for alternative in self.alternatives:
+            name = " + ".join(sorted(set(alternative.model.effects) - {*self.model.effects}))
+            shares[name] = shares.get(name, 0.0) + alternative.probability
+        named = [f"{name} (probability {100.0 * share:.0f} %)" for name, share in shares.items() if name]
+        used = "a smooth correction" if self.model.unnamed else "the most probable model"
+        sentence = (
+            f"the prediction uses {used} in place of {' or '.join(named)}"
+            if named
+            else "the tests permit other values of the parameters"
+        )
+        sentence += ": the bands, low to high, include each alternative"
         return [Caveat("undecided", sentence)]
 
     @property
