@@ -64,7 +64,7 @@ def describe_loop(loop: Loop, labels: Labels) -> Findings:
     facts = {
         "cycles": f"{prepared.cycles:.3g}, {'the first from rest' if prepared.from_rest else 'treated as steady'}",
         "frequency": f"{frequency:.4g} Hz, {waveform(prepared.coefficients)}",
-        "sampling": f"{describe_sampling(loop)}, {loop.time.size / prepared.cycles:.4g} rows per cycle",
+        "sampling": f"{describe_sampling(loop)}, {prepared.test.time.size / prepared.cycles:.4g} rows per cycle",
         "amplitude": f"{number(to_length * amplitude, 4)} {length} zero-to-peak",
         # down to the last digit of the amplitude: what lies below is noise
         f"mean {names[0]}": f"{format_aligned([to_length * amplitude, to_length * mean_motion], 4)[1]} {length}",

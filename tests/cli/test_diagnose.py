@@ -101,7 +101,7 @@ def test_every_residual_and_every_candidate_is_in_a_table(found):
     assert (levels["sleeve_compliance"], levels["inertia"]) == ("unresolved", "instrument")
     assert table.why.notna().all()
     assert table.set_index("effect").why["inertia"] == "part of the most probable explanation"
-    assert table.score.is_monotonic_decreasing
+    assert table["expected chi-square gain"].is_monotonic_decreasing
     assert table.effect[table.probability.idxmax()] == "inertia"
     assert table[table["chi-square gain"].notna() & ~mistakes].parameters.str.contains("=").all()
 
