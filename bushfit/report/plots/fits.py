@@ -160,7 +160,7 @@ def loops_figure(result: Result, table: pd.DataFrame, title: str) -> style.Chart
     for (place, loops), (force_panel, phase_panel) in zip(places, grid, strict=True):
         looks = style.styles(len(loops), "loop")
         _draw_forces(force_panel, place, loops, looks)
-        style.label_axes(phase_panel, "phase after the upper turn [deg]", "force residual / noise")
+        style.label_axes(phase_panel, "phase after the peak [deg]", "force residual / noise")
         for loop, look in zip(loops.values(), looks, strict=True):
             counted = loop[loop["outlier"] == "no"]
             rows = _drawn_rows(counted)

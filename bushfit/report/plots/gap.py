@@ -257,7 +257,7 @@ def _draw_loops(panels: Sequence[Axes], place: Place, loops: dict[str, pd.DataFr
     """
     looks = style.styles(len(loops), "loop")
     for axes, side in zip(panels, sides, strict=True):
-        style.label_axes(axes, "phase after turn [deg]", "")
+        style.label_axes(axes, "phase after peak [deg]", "")
         for loop, look in zip(loops.values(), looks, strict=True):
             draw_sector_means(axes, loop, place, f"force {side} [%]", look)
         axes.axhline(0.0, color=style.GREY, lw=0.6, zorder=1)
