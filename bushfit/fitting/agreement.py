@@ -258,7 +258,7 @@ def prior_uses(solution: FitResult, covariance: Covariance) -> dict[str, PriorUs
 
 
 def prior_warnings(uses: Mapping[str, PriorUse]) -> list[Caveat]:
-    """Warnings about priors that the tests contradict, one for each prior."""
+    """Return a warning for each prior that the tests contradict."""
     return [
         Caveat(
             "prior_contradicted",
