@@ -42,12 +42,12 @@ from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.units import number
 
-#: Summary if there is no gap; and note on tests of one direction.
+#: Summary if there is no gap; and warning if one direction was tested.
 _NOTHING = "the tests show no missing effect beyond noise and tolerance"
 _ONE_DIRECTION = Caveat(
     "one_direction",
-    "one direction was tested: a deviation of the compound and a smooth fault of the rig cannot be distinguished; test "
-    "another direction or specimen",
+    "only one direction was tested: a smooth fault of the rig, such as a compliant fixture, would be taken for a "
+    "property of the rubber. Test another direction or specimen, or a spring of known stiffness",
 )
 #: Advice if levels disagree by more than the class of the rig.
 _LEVELS_ADVICE = "measure the levels again in another session, or state the class of the rig (gain_error under [rig])"
@@ -390,7 +390,7 @@ class DiagnosisWriter:
         sentence = f"not identifiable from these tests: {', '.join(unseen)}"
         notes = [Caveat("effects_not_visible", sentence)] if unseen else []
         directions = {str(test.direction) for test in self.search.base.data_sets}
-        return [*notes, *([_ONE_DIRECTION] if self.first and self.first.unnamed and len(directions) == 1 else [])]
+        return [*notes, *([_ONE_DIRECTION] if len(directions) == 1 else [])]
 
 
 def _may_be_absent(name: str, result: Result) -> bool:

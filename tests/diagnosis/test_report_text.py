@@ -53,7 +53,10 @@ def test_compliance_in_one_direction_alone_is_never_a_bold_name(measured):
     low, high = whole.result.interval("sleeve_compliance.compliance") or (0.0, 0.0)
     assert low <= 4e-8 <= high
     for sweeps, loops in ((campaign.sweeps[:1], campaign.loops), (campaign.sweeps[1:2], ())):
-        assert asked(replace(campaign, sweeps=sweeps, loops=loops)).verdict in ("consistent", "ambiguous")
+        alone = asked(replace(campaign, sweeps=sweeps, loops=loops))
+        assert alone.verdict in ("consistent", "ambiguous")
+        assert "one_direction" in [note.kind for note in alone.notes]
+    assert "one_direction" not in [note.kind for note in whole.notes]
     again = asked(campaign, whole.result.model, unresolved=whole.result.unresolved)
     assert (again.verdict, again.result.unresolved) == ("consistent", ("sleeve_compliance",))
     settled = asked(campaign, whole.result.model, unresolved=whole.result.unresolved, adopt=("rig_compliance",))
