@@ -141,7 +141,7 @@ def draw_response(title: str, table: ResultFile, warnings: Sequence[Caveat] = ()
 
     Args:
         title: title of the figure.
-        table: result file with the table.
+        table: result file whose content is the table of time, displacement and forces.
         warnings: warnings to print below the figure.
     """
     return plots.response.response_figure(title, table.content(), plots.style.warnings_note(warnings))

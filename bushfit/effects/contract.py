@@ -40,6 +40,9 @@ if TYPE_CHECKING:
 REFERENCE_FREQUENCY = 25.0
 REFERENCE_STRAIN = 0.01
 
+#: Distance from a bound, in fitted coordinates, up to which a parameter is at the bound.
+AT_BOUND = 1e-3
+
 #: A number, or an array that broadcasts against operating points or samples.
 Value = Any
 #: Parameter values by name.
@@ -107,10 +110,10 @@ class Parameter:
         return (self.neutral or 0.0) + share * self.typical
 
     def reached_bound(self, value: float) -> Literal["min", "max"] | None:
-        """Bound that a value is at, within a thousandth of the fitted coordinate; None between the bounds."""
+        """Bound that a value is at, within `AT_BOUND` of the fitted coordinate; None between the bounds."""
         low, high = self.bounds
         low, point, high = (math.log(x) if self.log else x / self.typical for x in (low, value, high))
-        near = 1e-3 * min(high - low, 1.0)
+        near = AT_BOUND * min(high - low, 1.0)
         return "min" if point - low < near else "max" if high - point < near else None
 
 

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from bushfit.effects.contract import Array
+from bushfit.effects.contract import AT_BOUND, Array
 from bushfit.errors import FitError
 from bushfit.fitting.coordinates import ROUNDING, Bounds, Coordinates, coordinate_bounds, prior_rows
 from bushfit.fitting.preparation import MeasuredTest, residual_slices
@@ -21,8 +21,6 @@ from bushfit.model.sensitivity import difference_quotients, stepped_values
 #: Smallest distance of the start values from the bounds, relative to the distance between the bounds: the conversion
 #: between values and coordinates rounds.
 _INSIDE = 1e-12
-#: Distance from a bound, in coordinates, up to which a parameter is at the bound.
-_AT_BOUND = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,7 +127,7 @@ class FitProblem:
             point: dimensionless coordinates of the k free parameters, (k,).
         """
         low, high = self.limits
-        near = _AT_BOUND * np.minimum(high - low, 1.0)
+        near = AT_BOUND * np.minimum(high - low, 1.0)
         rooms: dict[End, Array] = {"min": point - low, "max": high - point}
         return {
             name: end for end, room in rooms.items() for name, met in zip(self.names, room < near, strict=True) if met

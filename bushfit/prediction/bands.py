@@ -44,7 +44,7 @@ class Band:
         return Band(np.log(self.value), low, high, self.root / self.value)
 
     def minus(self, subtrahend: Band) -> Band:
-        """Band of the difference from `subtrahend`, a quantity at the same points with independent errors.
+        """Band of this quantity minus `subtrahend`, of the same unit and points, with independent errors.
 
         Notes: the distance from the difference to an end of its band is the root sum of squares of the distances in the
         two bands (G. Zou, A. Donner, Stat. Med. 27 (2008) 1693).

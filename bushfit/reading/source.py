@@ -85,7 +85,11 @@ class Text:
         return is_grouped or any(self.data.find(mark.encode(), start) >= 0 for mark in marks)
 
     def first_words(self, delimiter: str) -> set[str]:
-        """Return the distinct texts without digits in the first column, such as "Mean" of a summary row."""
+        """Return the distinct texts without digits in the first column, such as "Mean" of a summary row.
+
+        Args:
+            delimiter: character between cells.
+        """
         mark = re.escape(delimiter).encode()
         first = re.compile(rb'\n[ \t"%b]*([^\d\r\n"%b]+)(?=["\r\n%b])' % (mark, mark, mark))
         return {word.decode("utf-8", "replace").strip() for word in set(first.findall(b"\n" + self.data))}

@@ -39,7 +39,8 @@ def validation_table(validations: Sequence[Validation], before: Sequence[Validat
         before: comparisons with the model without the effects that a diagnosis added; empty if none were added.
 
     Returns:
-        Name, direction, NRMSE, gap of peak and energy, and share of the points inside the band, in percent.
+        Name and direction of each record; NRMSE, relative differences of peak force and energy, and share of the points
+        inside the band, all in percent.
     """
     columns = {
         "test": [validation.record.name for validation in validations],
