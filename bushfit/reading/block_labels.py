@@ -8,7 +8,7 @@ from itertools import pairwise
 
 from bushfit import units
 from bushfit.reading.headers import COUNTED, SWEEP_COLUMNS, Vocabulary
-from bushfit.reading.layout import Line
+from bushfit.reading.lines import Line
 from bushfit.reading.names import labels_and_text_above, labels_in_names, named_direction, named_quantities
 from bushfit.reading.roles import CONDITIONS
 

@@ -12,7 +12,8 @@ from bushfit import units
 from bushfit.geometry import Direction
 from bushfit.reading.block_labels import is_of_block, label_columns
 from bushfit.reading.headers import SWEEP_COLUMNS, Vocabulary, split_unit
-from bushfit.reading.layout import WITH_UNIT, Layout, Line, is_comment, is_row, is_summary_row, is_units_row
+from bushfit.reading.layout import Layout
+from bushfit.reading.lines import WITH_UNIT, Line, is_comment, is_row, is_summary_row, is_units_row
 from bushfit.reading.names import (
     NO_LABELS,
     labels_above,

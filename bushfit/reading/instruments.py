@@ -21,7 +21,8 @@ import numpy as np
 from bushfit.errors import MeasurementError
 from bushfit.reading.formats import arrow, labview, matlab, mdf, tdms
 from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS, Vocabulary
-from bushfit.reading.layout import Layout, Line
+from bushfit.reading.layout import Layout
+from bushfit.reading.lines import Line
 from bushfit.reading.source import Channel, Channels, Group, Sheet
 from bushfit.reading.uff import uff
 from bushfit.reading.workbook import workbook

@@ -7,24 +7,21 @@ Notes:
     tests/files/exports. If encoding and decimal mark are known, clevercsv separates the columns of nearly all.
 """
 
-import csv
 import re
 from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
-from typing import Annotated, Literal, NamedTuple
+from typing import Annotated, Literal
 
 from pydantic import BeforeValidator
 
-from bushfit import units
 from bushfit.caveat import Caveat
-from bushfit.reading.headers import WORDS, Vocabulary, plain, split_convention, split_unit
+from bushfit.reading.headers import Vocabulary, plain, split_unit
+from bushfit.reading.lines import MOST_COLUMNS, Content, Line, is_comment, is_row, is_units_row, split
 from bushfit.reading.numerals import is_like_number
 from bushfit.reading.roles import is_test, is_unit_alone, stated_once
 
-#: First words of rows that summarise others.
-_SUMMARIES = frozenset(map(plain, WORDS["rows_of"]["summary"]))
 #: Characters that separate columns, by their names in a campaign, in the order in which they are tried.
 DELIMITERS = {"semicolon": ";", "tab": "\t", "pipe": "|", "comma": ",", "caret": "^", "blanks": " "}
 #: Signs in numbers by the words for them.
@@ -34,49 +31,22 @@ _SIGN = BeforeValidator(lambda raw: SIGNS.get(raw, raw) if isinstance(raw, str) 
 _WORD = BeforeValidator(lambda raw: next((word for word, sign in DELIMITERS.items() if sign == raw), raw))
 #: Non-empty lines at the start of a file that are searched for the header; chosen: far more than preambles have.
 MOST_HEAD_LINES = 500
-#: Largest number of columns of a table; chosen: far more than a test has.
-_MOST_COLUMNS = 1000
 #: Largest number of columns whose units are looked up to find the header; chosen: a test has fewer.
 _MOST_HEADINGS = 50
-#: Largest number of characters of a line; chosen: a longer line is not a row of a table.
-_LONGEST_LINE = 1 << 20
 #: Largest number of characters of a header line; chosen: ten for each column.
 _LONGEST_HEADER = 10_000
 #: Non-empty lines below a header that are searched for its units row and first numbers; chosen: room for comments.
 _LINES_BELOW_HEADER = 8
-_DIGIT = re.compile(r"\d")
-_COMMENT_SIGNS = ("#", "%", "//")
 #: A number with a number sign: "#1".
 _NUMBERED = re.compile(r"#\s?\d+\b")
 #: Blanks between a name and the bracket of its unit, which do not separate columns.
 _BLANK_BEFORE_BRACKET = re.compile(r" {1,8}(?=[\[(])")
-#: Blanks between columns of cells with units, such as "5 Hz 0.1 mm": not behind a number without its unit.
-_BETWEEN_QUANTITIES = re.compile(r"(?<=[^\d\s])\s+|\s+(?=[+-]?\.?\d)")
-#: Number with a unit: "594.4 N/mm", "±0,5mm", "5.7°". Possessive: an exponent belongs to the number, never to the unit.
-WITH_UNIT = re.compile(
-    r"(?:±|\+/?-)?\s*(?P<number>[+-]?[\d.,]++(?:\s*+[eEdD][+-]?\d++)?+)\s*+(?P<unit>(?:[^\W\d]|[°%‰])[^;]{0,20})"
-)
 #: Wide gap, which is shortened to two blanks.
 _WIDE_GAP = re.compile(" {3,}")
 #: Gap between columns whose headers contain single blanks.
 _COLUMN_GAP = re.compile(r"\t|\s{2,}")
 #: Cell of a line whose columns are separated by wide gaps.
 _CELL = re.compile(r"\S+(?: \S+)*")
-
-#: A line of a text, or the cells of a row of a workbook: texts and numbers.
-Content = str | Sequence[str | float]
-
-
-class Line(NamedTuple):
-    """Non-empty line of a text or row of a sheet: its number from 1, and its content."""
-
-    number: int
-    content: Content
-
-    @property
-    def text(self) -> str:
-        """Text of the line; of a row, its cells separated by blanks."""
-        return self.content.strip() if isinstance(self.content, str) else " ".join(map(str, self.content)).strip()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -143,34 +113,6 @@ class Layout:
         names = {plain(split_unit(header)[0]) for header in self.headers} - {""}
         matching = names & {plain(split_unit(cell)[0]) for cell in cells}
         return max(len(matching), len(vocabulary.roles(cells) & vocabulary.roles(self.headers))) > 1
-
-
-def split(content: Content, delimiter: str) -> list[str]:
-    """Return the texts of the cells of a line, stripped of blanks and without empty cells at the end.
-
-    Raises:
-        csv.Error: the line or a quoted cell is far too long.
-    """
-    if not isinstance(content, str):
-        return [cell if isinstance(cell, str) else repr(cell) for cell in content]
-    text = content.rstrip(f" {delimiter}")
-    if len(text) > _LONGEST_LINE:
-        raise csv.Error(f"a line of {len(text)} characters")
-    if delimiter == " ":
-        cells, quantities = text.split(), _BETWEEN_QUANTITIES.split(text.strip())
-        if len(quantities) < len(cells) and len(quantities) > 1:
-            found = [match["unit"] for match in map(WITH_UNIT.fullmatch, quantities) if match]
-            return quantities if len(found) > 1 and all(map(units.is_unit, found)) else cells
-        return cells
-    if '"' in text:
-        return [cell.strip() for cell in next(csv.reader([text], delimiter=delimiter, skipinitialspace=True), ())]
-    return [cell.strip() for cell in text.split(delimiter, _MOST_COLUMNS)]
-
-
-def is_comment(content: Content, delimiter: str) -> bool:
-    """Return True if a line begins with a comment sign: #, %, //, or a semicolon that is not the delimiter."""
-    text = content if isinstance(content, str) else next((str(cell) for cell in content if cell != ""), "")
-    return text.lstrip().startswith(_COMMENT_SIGNS if delimiter == ";" else (*_COMMENT_SIGNS, ";"))
 
 
 def find_layout(
@@ -263,7 +205,7 @@ def header_cells(content: Content, delimiter: str) -> Iterator[list[str]]:
     for cells in forms:
         while cells and not cells[-1]:
             cells.pop()
-        if 1 < len(cells) <= _MOST_COLUMNS:
+        if 1 < len(cells) <= MOST_COLUMNS:
             yield cells
 
 
@@ -271,13 +213,6 @@ def _below(lines: Sequence[Line], header: int, delimiter: str) -> Iterator[Line]
     """Yield the first few lines below the header line with the index `header`, without comments."""
     below = lines[header + 1 : header + 1 + _LINES_BELOW_HEADER]
     return (line for line in below if not is_comment(line.content, delimiter))
-
-
-def is_row(cells: Sequence[str]) -> bool:
-    """True if half of the non-empty cells, and at least two, are numbers, and the first cell is not a "name:"."""
-    filled = [cell for cell in cells[:_MOST_COLUMNS] if cell]
-    numbers = sum(map(is_like_number, filled))
-    return numbers > 1 and 2 * numbers >= len(filled) and not filled[0].endswith(":")
 
 
 def _first_rows(lines: Sequence[Line], delimiters: Sequence[str]) -> tuple[int, Sequence[str]]:
@@ -386,16 +321,3 @@ def _below_headers(header: str, row: str) -> list[str]:
     }
     aligned = [by_column.get(n, "") for n in range(len(spans))]
     return aligned if len(by_column) == len(cells) < len(spans) else [text for *_, text in cells]
-
-
-def is_units_row(cells: Sequence[str]) -> bool:
-    """Return True if at least half of the non-empty cells are units and no cell is a number other than the unit 1."""
-    filled = [split_convention(cell.strip("[]() "))[0] for cell in cells if cell.strip("[]() ")]
-    has_numbers = any(is_like_number(cell) and cell != "1" for cell in filled)
-    return not has_numbers and 0 < len(filled) <= 2 * sum(units.is_unit(cell) for cell in filled)
-
-
-def is_summary_row(cells: Sequence[str]) -> bool:
-    """Return True if the first text of a row is a word such as "Mean" or "Std", so that it summarises other rows."""
-    first = next(filter(None, cells), "")
-    return _DIGIT.search(first) is None and plain(first) in _SUMMARIES

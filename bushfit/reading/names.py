@@ -22,7 +22,7 @@ from bushfit.reading.headers import (
     plain,
     split_convention,
 )
-from bushfit.reading.layout import Line
+from bushfit.reading.lines import Line
 
 #: Usual spelling of the units in names, by their spelling in lower case.
 _UNITS = {spelling: unit for unit, spellings in WORDS["units_in_names"].items() for spelling in spellings}

@@ -12,7 +12,7 @@ from bushfit import units
 from bushfit.caveat import Caveat
 from bushfit.errors import MeasurementError, UnitError
 from bushfit.reading.headers import ROLE_SETS, WORDS, Column, Vocabulary, parse_unit, plain, split_unit
-from bushfit.reading.layout import is_row, is_summary_row
+from bushfit.reading.lines import is_row, is_summary_row
 from bushfit.reading.measurement import Floats
 from bushfit.reading.numerals import is_like_number
 from bushfit.reading.source import LEAST_VALUE, Sheet

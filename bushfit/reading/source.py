@@ -14,7 +14,8 @@ from typing import Any, NamedTuple
 from numpy.typing import NDArray
 
 from bushfit.reading.files import CHUNK_BYTES, HEAD_BYTES
-from bushfit.reading.layout import MOST_HEAD_LINES, Layout, Line, split
+from bushfit.reading.layout import MOST_HEAD_LINES, Layout
+from bushfit.reading.lines import Line, split
 from bushfit.reading.numerals import APOSTROPHES, BLANKS
 from bushfit.units import SIZES
 

@@ -20,7 +20,8 @@ from bushfit.geometry import TRANSLATION, Motion
 from bushfit.reading.headers import Column, Vocabulary
 from bushfit.reading.instruments import word_for_part
 from bushfit.reading.labelled import find_labels
-from bushfit.reading.layout import Layout, Line, is_comment, is_row, is_summary_row
+from bushfit.reading.layout import Layout
+from bushfit.reading.lines import Line, is_comment, is_row, is_summary_row
 from bushfit.reading.measurement import Floats
 from bushfit.reading.names import Labels, is_remark, labels_and_text_above
 from bushfit.reading.numerals import Numerals, find_first_decimal, find_numerals, is_like_number

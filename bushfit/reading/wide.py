@@ -21,7 +21,8 @@ from bushfit.caveat import Caveat
 from bushfit.errors import MeasurementError
 from bushfit.reading.blocks import find_segments
 from bushfit.reading.headers import COUNTED, AmplitudeConvention, Vocabulary, split_convention
-from bushfit.reading.layout import Layout, Line, is_comment, is_row, is_summary_row
+from bushfit.reading.layout import Layout
+from bushfit.reading.lines import Line, is_comment, is_row, is_summary_row
 from bushfit.reading.numerals import is_like_number, plainest_value
 from bushfit.reading.roles import CONDITIONS
 from bushfit.reading.source import RowSource, Sheet, cells_of

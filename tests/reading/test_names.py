@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from bushfit import units
 from bushfit.geometry import Direction
-from bushfit.reading.layout import Line
+from bushfit.reading.lines import Line
 from bushfit.reading.names import Labels, direction_of_file, labels_above, labels_in_names
 
 
