@@ -126,7 +126,7 @@ class SearchState:
     @classmethod
     def of_tests(cls, tests: RecordedTests) -> SearchState:
         """Create the initial state of a search: the starting model with nothing added."""
-        return cls(tests, tests.base, tests.bare, tests.log_prior, change=tests.change)
+        return cls(tests, tests.base, tests.bare, tests.log_odds, change=tests.change)
 
     def with_fit(self, fit: FitResult) -> SearchState:
         """Replace the fit by another fit of the same model, whose effects have the same prior."""

@@ -2,8 +2,9 @@
 
 import numpy as np
 
-#: Prior probability of each kind of explanation; the rest to 1 is the prior probability that nothing is missing. One
-#: bushing in two meets its model; for most others the library has the missing effect.
+#: Prior odds of each kind of explanation against "nothing is missing": the expected number of such causes in a campaign.
+#: Causes are independent, so the odds of several multiply, and nothing is missing with the probability e^-0.5 = 0.61
+#: (Poisson). For most other campaigns the library has the missing effect.
 ODDS = {"effect": 0.22, "part": 0.15, "record": 0.03, "unnamed": 0.10}
 #: Sizes of missing effects and faults, relative to |K|, of equal prior probability: from invisible to obvious.
 SIZES = np.geomspace(0.004, 0.4, 7)

@@ -35,7 +35,7 @@ class RecordedTests:
         errors: errors of the rig that points share.
         deviation: changes of the residuals if the rubber deviates smoothly from the model's laws; None if the tests
             cannot show any.
-        log_prior: natural log of the prior probability that this record is right and nothing is missing.
+        log_odds: natural log of the prior odds of the corrected mistake; 0 for the tests as recorded.
         claim: mistake that is corrected; None for the tests as recorded.
         change: relative change of the recorded quantities due to the correction; 0 for the tests as recorded.
     """
@@ -45,25 +45,25 @@ class RecordedTests:
     rig: RigSettings
     errors: RigErrors
     deviation: Group | None
-    log_prior: float
+    log_odds: float = 0.0
     claim: Claim | None = None
     change: float = 0.0
 
     @classmethod
     def of_fit(
-        cls, base: FitResult, rig: RigSettings, log_prior: float, claim: Claim | None = None, change: float = 0.0
+        cls, base: FitResult, rig: RigSettings, log_odds: float = 0.0, claim: Claim | None = None, change: float = 0.0
     ) -> RecordedTests:
         """Build the tests from a fit of the starting model.
 
         Args:
             base: fit of the starting model to the tests, as recorded or with a mistake corrected.
             rig: accuracy class of the rig: its stated gain and phase errors.
-            log_prior: natural log of the prior probability that this record is right and nothing is missing.
+            log_odds: natural log of the prior odds of the corrected mistake; 0 for the tests as recorded.
             claim: mistake that is corrected; None for the tests as recorded.
             change: largest relative change of a recorded quantity in the correction; 0 for the tests as recorded.
         """
         bare = in_scatter_units(base)
-        return cls(base, bare, rig, rig_errors(bare, rig), compound(bare), log_prior, claim, change)
+        return cls(base, bare, rig, rig_errors(bare, rig), compound(bare), log_odds, claim, change)
 
     @cached_property
     def columns(self) -> ExplanationColumns:

@@ -90,14 +90,13 @@ class Search:
         settings = self.settings
         adopted = sum(get_mistake(name) is None for name in settings.adopt)
         self._most_effects = max(settings.max_effects - adopted, min(settings.max_effects, 1))
-        log_prior = log(1.0 - sum(ODDS.values()))
-        tests = RecordedTests.of_fit(self.base, self.data.campaign.rig, log_prior)
+        tests = RecordedTests.of_fit(self.base, self.data.campaign.rig)
         self.root = SearchState.of_tests(tests)
         self.proposals = proposals(tests.bare, settings.without, self.base.fixed)
         self._fit_rivals = partial(fit_rivals, fixed=self.base.fixed, bounds=self.data.bounds)
         self._log_priors = prior_odds([*self.proposals, *tests.explanations])
         families = {e.family for e in (*self.outlier_clusters, *tests.explanations) if e.kind == "part"}
-        self._meeting_odds = log(ODDS["part"] / max(len(families), 1)) - tests.log_prior
+        self._meeting_odds = log(ODDS["part"] / max(len(families), 1))
 
     def run(self) -> list[Hypothesis]:
         """Run the search: extend the most probable sets of explanations by one more, for a few rounds.
@@ -347,9 +346,10 @@ class Search:
             with suppress(FitError, ModelError):  # corrected tests that nothing can be fitted to
                 fit = self.fit_corrected(claim.corrected())
                 if [test.size for test in fit.data_sets] == [test.size for test in self.base.data_sets]:
-                    odds = log(ODDS["record"]) - log(len(possible)) - 0.5 * modulus_deviation(fit) ** 2
+                    log_odds = log(ODDS["record"] / len(possible))
+                    log_odds -= 0.5 * (modulus_deviation(fit) ** 2 - modulus_deviation(self.base) ** 2)
                     change = record_change(self.base, fit)
-                    tests = RecordedTests.of_fit(fit, self.data.campaign.rig, odds, claim, change)
+                    tests = RecordedTests.of_fit(fit, self.data.campaign.rig, log_odds, claim, change)
                     yield self._visit(SearchState.of_tests(tests))
 
 
