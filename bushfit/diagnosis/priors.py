@@ -2,7 +2,7 @@
 
 import numpy as np
 
-#: Prior odds of each kind of explanation against "nothing is missing": the expected number of such causes in a campaign.
+#: Prior odds of each kind of explanation against "nothing is missing": expected number of such causes in a campaign.
 #: Causes are independent, so the odds of several multiply, and nothing is missing with the probability e^-0.5 = 0.61
 #: (Poisson). For most other campaigns the library has the missing effect.
 ODDS = {"effect": 0.22, "part": 0.15, "record": 0.03, "unnamed": 0.10}
