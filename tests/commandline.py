@@ -31,6 +31,11 @@ class Done:
     stdout: str
     stderr: str
 
+    @property
+    def text(self) -> str:
+        """What is printed on both, the results first."""
+        return self.stdout + self.stderr
+
 
 #: Types a command, and gives what it left; an exit status other than `status=0` fails the test.
 Run = Callable[..., Done]

@@ -51,7 +51,7 @@ def made(paper_model, tmp_path_factory) -> Path:
     production.make(folder, paper_model)
     batch = ("batch", "part_*/bushing.toml", "--limits", "limits.toml", "--jobs", "1", "-o", "out", "--no-plots")
     done = typing(folder)(*batch, status=1)
-    (folder / "said").write_text(done.stderr, encoding="utf-8")
+    (folder / "said").write_text(done.stdout, encoding="utf-8")
     return folder
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -101,8 +102,8 @@ def command(
     task = RowTask(folder.absolute(), tuple(dict.fromkeys(points)), formats, resume)
     plan = BatchPlan(listed.title, listed.rows, task, judged_by, junit, output.formats)
     check_output(plan, force=output.force)
-    warn, show = (lambda line: output.print(f"warning: {line}")), (lambda result: output.print_json(result.summary))
-    result = run_batch(plan, workers, show, warn)
+    warn = partial(output.messages.print, "warning:", markup=False)
+    result = run_batch(plan, workers, lambda result: output.print_json(result.summary), warn)
     _print_result(output, result, folder)
     if result.document.failed or result.document.missed or result.document.not_judged:
         click.get_current_context().exit(1)

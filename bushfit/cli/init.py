@@ -67,7 +67,7 @@ def command(files: tuple[Path, ...], name: str | None, no_input: bool, output: O
 
     test_options: Mapping[str, Any] = sizes.pop("test_options")
     at_terminal = sys.stdin is not None and sys.stdin.isatty()
-    questions = Questions(output, at_terminal and not (no_input or output.quiet or output.as_json))
+    questions = Questions(at_terminal and not (no_input or output.quiet or output.as_json))
     usual = (files[0].resolve() if files[0].is_dir() else files[0].resolve().parent).name
     if name is None and questions.enabled and not any(sizes.values()):
         name = click.prompt("name of the bushing", default=usual, err=True)
@@ -265,11 +265,9 @@ class Questions:
     """Questions at a terminal for missing options of one command; each answer becomes the next default.
 
     Args:
-        output: output of the command.
         enabled: True if questions are permitted: at a terminal, without --no-input.
     """
 
-    output: Output
     enabled: bool
     _answers: dict[_Key, Any] = field(default_factory=lambda: dict.fromkeys(_ONCE))
 
@@ -327,7 +325,7 @@ class Questions:
         name, role = key
         answer = self._answers.get(key)
         if key not in _ONCE or answer is None:
-            self.output.print(f"\n{error}")
+            click.echo(f"\n{error}", err=True)
             question = QUESTIONS.get(name, name.replace("_", " ")).format(role=role.replace("_", " "))
             default = _ONCE.get(key, answer)
             answer = click.prompt(

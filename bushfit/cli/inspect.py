@@ -31,7 +31,7 @@ _FILES_A_PICTURE = 5
 
 @command_called("inspect", "data/arm_bushing/loop_axial_1.csv data/arm_bushing/sweep_radial.csv")
 @metadata_options()
-@with_output("results/<first file>", "pictures")
+@with_output("results/<first file>", "pictures", to_stderr=True)
 def command(files: tuple[Path, ...], test_options: Mapping[str, Any], output: Output) -> None:
     """Show how bushfit reads test files, before a campaign exists: loops, sweeps, raw histories.
 

@@ -7,7 +7,7 @@ import os
 import re
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from operator import attrgetter
 from pathlib import Path
@@ -24,7 +24,7 @@ from rich.table import Table
 
 from bushfit.caveat import GENERAL, Caveat
 from bushfit.cli.options import Folder, Parameter, flag, option, option_group
-from bushfit.errors import printable
+from bushfit.errors import OutputError, printable
 from bushfit.progress import report_progress_to
 from bushfit.reading.tablefile import Form, folder_name
 from bushfit.report.results import Formats, Picture, ResultFile, check_free, to_json, write_results
@@ -53,7 +53,7 @@ _FORMAT_OPTIONS: dict[Written, Parameter] = {
 }
 #: Seconds after which a command shows its progress.
 _PATIENCE = 2.0
-#: Width of tables if standard error is no terminal, in characters.
+#: Width of tables if their stream is no terminal, in characters.
 _WIDTH = 100
 #: Largest number of warnings that are printed without -v.
 _MOST_WARNINGS = 3
@@ -62,7 +62,23 @@ _GAP = 3
 
 
 class _Console(Console):
-    """Console that escapes control characters in texts from files."""
+    """Console that escapes control characters in texts from files.
+
+    Args:
+        stderr: True for standard error, False for standard output.
+        quiet: True to print nothing.
+    """
+
+    def __init__(self, *, stderr: bool, quiet: bool) -> None:
+        super().__init__(stderr=stderr, quiet=quiet, highlight=False, soft_wrap=True, emoji=False)
+        if not self.is_terminal:
+            columns = os.environ.get("COLUMNS", "")
+            self.width = int(columns) if columns.isdecimal() else _WIDTH
+
+    def print(self, *objects: Any, **options: Any) -> None:
+        """Print objects of rich; a text that cannot be written, as to a full disk, is an error at the end only."""
+        with suppress(OutputError):
+            super().print(*objects, **options)
 
     def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
         """Render an object of rich as pieces of text, with control characters as escape sequences."""
@@ -77,6 +93,7 @@ class Output:
     Args:
         default: default results folder, with a placeholder such as <name> for the name of the result.
         formats: file formats of tables and figures, and the kinds of result file to write.
+        to_stderr: True to print texts and tables on standard error, because standard output is for JSON or TOML.
         output: results folder from --output; None for the default.
         verbose, quiet: True to print more, or errors only.
         as_json: True to print the result as JSON on standard output.
@@ -85,6 +102,7 @@ class Output:
 
     default: str
     formats: Formats
+    to_stderr: bool
     output: Path | None
     verbose: bool
     quiet: bool
@@ -95,12 +113,13 @@ class Output:
 
     @property
     def console(self) -> Console:
-        """Console on standard error; silent with --quiet."""
-        console = _Console(stderr=True, quiet=self.quiet, highlight=False, soft_wrap=True, emoji=False)
-        if not console.is_terminal:
-            columns = os.environ.get("COLUMNS", "")
-            console.width = int(columns) if columns.isdecimal() else _WIDTH
-        return console
+        """Console for results; silent with --quiet."""
+        return _Console(stderr=self.to_stderr, quiet=self.quiet)
+
+    @property
+    def messages(self) -> Console:
+        """Console for progress and warnings, on standard error; silent with --quiet."""
+        return _Console(stderr=True, quiet=self.quiet)
 
     def folder(self, name: str, *files: str) -> Path:
         """Folder for results: --output, or the default; checked for conflicts if names of files are given.
@@ -118,7 +137,7 @@ class Output:
         return folder
 
     def print(self, text: str) -> None:
-        """Print a line on standard error without interpreting markup."""
+        """Print a line of the result without interpreting markup."""
         self.console.print(text, markup=False)
 
     def print_headline(self, name: str, verdict: str, action: str = "", colour: str = "default") -> None:
@@ -142,11 +161,12 @@ class Output:
             distinct.setdefault(warning.kind, warning)
         printed = warnings if self.verbose else [*distinct.values()][:_MOST_WARNINGS]
         for warning in printed:
-            self.console.print(f"[yellow]warning:[/yellow] {escape(warning.text)}")
+            self.messages.print(f"[yellow]warning:[/yellow] {escape(warning.text)}")
             if warning.consequence != GENERAL:
-                self.print(f"  {warning.consequence}")
+                self.messages.print(f"  {warning.consequence}", markup=False)
         if remaining := len(warnings) - len(printed):
-            self.print(f"{remaining} more warning{'s' * (remaining > 1)}: -v prints all; the result files contain them")
+            more = f"{remaining} more warning{'s' * (remaining > 1)}"
+            self.messages.print(f"{more}: -v prints all; the result files contain them", markup=False)
         self._warnings.clear()
 
     def print_table(
@@ -207,13 +227,16 @@ class Output:
         self.print(f"wrote {', '.join(written)} to {folder}")
 
 
-def with_output(folder: str, *written: Written, target: str = "Write the results to this folder") -> Parameter:
+def with_output(
+    folder: str, *written: Written, target: str = "Write the results to this folder", to_stderr: bool = False
+) -> Parameter:
     """Create the options shared by all commands, whose functions receive them as one argument `output`.
 
     Args:
         folder: default results folder, with a placeholder such as <campaign name> for the name of the result.
         written: kinds of result file whose formats can be chosen.
         target: beginning of the help of --output.
+        to_stderr: True for a command that prints TOML on standard output, and thus texts on standard error.
     """
 
     def start(context: click.Context, values: dict[str, Any]) -> Output:
@@ -224,8 +247,8 @@ def with_output(folder: str, *written: Written, target: str = "Write the results
             table_form=values.pop("table_format", Formats.table_form),
             picture_forms=tuple(dict.fromkeys(values.pop("plot_format", Formats.picture_forms))),
         )
-        output = Output(folder, formats, **values)
-        context.with_resource(_progress(output.console))
+        output = Output(folder, formats, to_stderr or values["as_json"], **values)
+        context.with_resource(_progress(output.messages))
         context.call_on_close(output.print_warnings)
         return output
 

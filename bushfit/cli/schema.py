@@ -34,7 +34,8 @@ def command(name: str | None, output: Output) -> None:
         output.write(output.output, results, document)
         return
     if name:
+        output = replace(output, as_json=True, to_stderr=True)
         output.print(f"{name} describes: {files[name]}")
     else:
         output.print_table("schemas", ("name", "describes"), files.items(), text_columns=2)
-    replace(output, as_json=output.as_json or name is not None).print_json(document)
+    output.print_json(document)

@@ -86,9 +86,9 @@ def test_a_bad_row_costs_that_row(typed, shop):
     head = ["campaign,name,commands,model", "bushings/b0/bushing.toml,=cmd|' /C calc'!A0,,"]
     (shop / "m.csv").write_text("\n".join([*head, *lines]))
     done = typed("batch", "m.csv", "-o", "all", "--junit", "all/report.xml", status=1)
-    assert "7 with an error" in done.stderr
-    assert "x could not be evaluated: " in done.stderr
-    assert "internal error of bushfit" not in done.stderr
+    assert "7 with an error" in done.text
+    assert "x could not be evaluated: " in done.text
+    assert "internal error of bushfit" not in done.text
     good, *bad = rows(shop / "all")
     assert good["name"].startswith("'="), "a spreadsheet must not run a name"
     assert [row["status"] for row in (good, *bad)] == ["done", *["failed"] * 7]
@@ -149,11 +149,11 @@ def test_a_campaign_that_kills_its_worker_is_told_once_and_the_others_go_on(type
     done_by = run.run_rows
     monkeypatch.setattr(run, "run_rows", lambda rows, task, *others: done_by(rows, partial(deadly, task), *others))
     done = typed("batch", PATTERN, "-o", "all", "--no-plots", "--no-report", "--jobs", "2", status=1)
-    assert "4 evaluated, 1 with an error" in done.stderr
+    assert "4 evaluated, 1 with an error" in done.text
     assert not (shop / "all/index.html").exists()
-    assert not {"Traceback", "\x1b"} & set(done.stderr.split()), "plain lines where there is no terminal"
+    assert not {"Traceback", "\x1b"} & set(done.text.split()), "plain lines where there is no terminal"
     assert [row["status"] for row in rows(shop / "all")] == ["done", "done", "failed", "done", "done"]
-    (told,) = [line for line in done.stderr.splitlines() if line.startswith("b2 ")]
+    (told,) = [line for line in done.text.splitlines() if line.startswith("b2 ")]
     assert told.startswith("b2 could not be evaluated: its worker process ended, probably for lack of memory")
     assert not (shop / "all/bushings/b2").exists()
 

@@ -127,9 +127,8 @@ def test_options_reach_the_workflow(bushfit, work, tmp_path):
 
 def test_a_clean_campaign(bushfit, tmp_path):
     run = bushfit("diagnose", CLEAN, "-o", tmp_path / "x", "--no-plots")
-    assert run.stdout == ""
-    assert "consistent" in run.stderr
-    assert "Probability that nothing is missing: above 99.5 %.\n" in run.stderr
+    assert "consistent" in run.stdout
+    assert "Probability that nothing is missing: above 99.5 %.\n" in run.stdout
     written = document(tmp_path / "x" / "diagnosis.json")
     assert (written["effects"], written["odds"]) == ([], [])
     assert written["nothing"] > 0.15
@@ -138,7 +137,7 @@ def test_a_clean_campaign(bushfit, tmp_path):
 def test_look_alikes_are_told_with_their_odds(work, bushfit):
     """And with what closes the gap meanwhile; the page says what the terminal says."""
     run = bushfit("diagnose", "case_003/bushing.toml", "--without", "force_offset", "-o", "alike", "--no-plots")
-    assert "bushfit diagnose case_003/bushing.toml --without force_offset --adopt sleeve_compliance" in run.stderr
+    assert "bushfit diagnose case_003/bushing.toml --without force_offset --adopt sleeve_compliance" in run.text
     written = document(work / "alike/diagnosis.json")
     assert written["verdict"] == "ambiguous"
     assert written["summary"].startswith("these tests cannot distinguish between ")
@@ -153,11 +152,11 @@ def test_look_alikes_are_told_with_their_odds(work, bushfit):
     assert shares == sorted(shares, reverse=True)
     assert 0.97 <= sum(shares) <= 1.0
     page = html.unescape((work / "alike/report.html").read_text(encoding="utf-8"))
-    assert "bushfit diagnose looks for" not in run.stderr + (work / "alike/model.json").read_text(encoding="utf-8")
+    assert "bushfit diagnose looks for" not in run.text + (work / "alike/model.json").read_text(encoding="utf-8")
     lines = [f"probability {100 * entry['probability']:.0f} %: {entry['words']}" for entry in written["odds"]]
     assert len(lines) > 1
     for line in lines:
-        assert f"  {line}\n" in run.stderr
+        assert f"  {line}\n" in run.text
     assert "".join(f"<li>{line}</li>" for line in lines) in page
     assert f"<b>Next test:</b> {written['next_test']}." in page
 
@@ -166,7 +165,7 @@ def test_it_is_told_with_its_line_and_nothing_is_mended(bushfit, work):
     done = bushfit("diagnose", DOUBLED, "-o", "doubled_told")
     adopt = f"bushfit diagnose {DOUBLED} --adopt {LABEL}"
     for words in ("these tests agree if the", "sweep_axial.csv are peak-to-peak", 'amplitude = "peak-to-peak"', adopt):
-        assert words in " ".join(done.stderr.split())
+        assert words in " ".join(done.text.split())
     written, model = (document(work / f"doubled_told/{name}.json") for name in ("diagnosis", "model"))
     (effect,) = written["effects"]
     assert (written["verdict"], effect["name"], effect["level"]) == ("named", "peak_to_peak", "record")

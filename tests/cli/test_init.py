@@ -32,9 +32,9 @@ def tests(root, tmp_path) -> list[Path]:
 def test_the_campaign_loads_and_fits_and_its_geometry_is_echoed(typed, tests, tmp_path, table_1):
     sizes = ("--inner-diameter", "20 mm", "--outer-diameter", "3.6 cm", "--length", "34 mm")
     done = typed("init", *tests, *sizes, "--name", 'Bushing "7"', "-o", "lab/campaign")
-    assert "rubber from 20 to 36 mm in diameter, 8 mm thick, 34 mm long" in done.stderr
-    assert "loop_axial_1.csv: loop, axial; cycles: 3, treated as steady; frequency: 0.1 Hz, a sine; " in done.stderr
-    assert "sweep_axial.csv: sweep, axial; frequencies: 16, from 5 to 155 Hz; amplitudes: " in done.stderr
+    assert "rubber from 20 to 36 mm in diameter, 8 mm thick, 34 mm long" in done.text
+    assert "loop_axial_1.csv: loop, axial; cycles: 3, treated as steady; frequency: 0.1 Hz, a sine; " in done.text
+    assert "sweep_axial.csv: sweep, axial; frequencies: 16, from 5 to 155 Hz; amplitudes: " in done.text
     written = tomllib.loads((tmp_path / "lab/campaign/campaign.toml").read_text(encoding="utf-8"))
     assert [test["file"] for test in written["loops"] + written["sweeps"]] == [f"../my tests/{name}" for name in FILES]
     campaign = load_campaign(tmp_path / "lab/campaign/campaign.toml")
@@ -51,11 +51,11 @@ def test_where_it_is_written_and_that_the_next_line_can_be_pasted(typed, tests, 
     assert json.loads(done.stdout)["campaign"] == text
     assert tomllib.loads(text)["bushing"]["name"] == "my tests"
     assert tomllib.loads(text)["loops"][0]["file"] == "my tests/loop_axial_1.csv"
-    assert "next: bushfit run lab/my.toml" in done.stderr
+    assert "next: bushfit run lab/my.toml" in done.text
     assert load_campaign(tmp_path / "lab/my.toml").bushing.shape == "calibrated"
     assert "# [report]" in text
     done = typed("init", *tests, *GEOMETRY)
-    (line,) = (line for line in done.stderr.splitlines() if line.startswith("next: bushfit run "))
+    (line,) = (line for line in done.text.splitlines() if line.startswith("next: bushfit run "))
     _, *words = shlex.split(line.removeprefix("next: "))
     assert words == ["run", str(Path("results/my tests/campaign.toml"))]
     assert (tmp_path / words[1]).exists()
@@ -227,7 +227,7 @@ def test_files_of_several_parts_are_campaigns_and_a_manifest(name, typed, root, 
     for number, part in enumerate(parts):
         above = "" if "part" in name else f"Specimen: {part}\n"
         sweep(root, tmp_path / "lab" / f"{name.format(number=number, part=part)}.csv", above)
-    assert "next: bushfit batch x/batch.toml" in typed("init", "lab", *GEOMETRY, "-o", "x").stderr
+    assert "next: bushfit batch x/batch.toml" in typed("init", "lab", *GEOMETRY, "-o", "x").stdout
     rows = tomllib.loads((tmp_path / "x/batch.toml").read_text(encoding="utf-8"))["bushings"]
     assert [row["campaign"] for row in rows] == [f"{part}.toml" for part in parts]
     for number, part in enumerate(parts):
@@ -250,11 +250,11 @@ def test_folders_in_folders_are_searched_and_bad_names_are_left_out(typed, root,
     assert "no part of the record is a loop" in typed("inspect", "lab/road_axial.csv", "--json", status=2).stderr
     for arguments in (("inspect", "lab", "--no-plots"), ("init", "lab", *GEOMETRY, "-o", "x.toml")):
         done = typed(*arguments)
-        assert "road_axial.csv: no part of the record is a loop" in done.stderr
+        assert "road_axial.csv: no part of the record is a loop" in done.text
     campaign = load_campaign(tmp_path / "x.toml")
     assert [str(test.direction) for test in campaign.sweeps] == ["axial", "radial"]
     for words in (r"axial_\u202e.csv: its name", r"axial_\udcff.csv: its name", "dangling.csv: a broken link"):
-        assert words in done.stderr
+        assert words in done.text
 
 
 def test_control_characters_of_a_name_are_escaped(typed, root, tmp_path):

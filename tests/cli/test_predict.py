@@ -44,8 +44,8 @@ def test_another_bushing_differs_and_the_places_and_grid_are_those_asked_for(bus
     ratio = table["other stiffness [N/mm]"] / table["reference stiffness [N/mm]"] - 1.0
     assert abs(ratio - table["relative difference of stiffness [-]"]).max() < 1e-4
     assert (table["relative difference of stiffness [-], significant"] == "yes").all()
-    assert "comparable only at equal alpha" in done.stderr
-    assert "B against A, axial: stiffness 2" in done.stderr
+    assert "comparable only at equal alpha" in done.text
+    assert "B against A, axial: stiffness 2" in done.text
 
 
 def test_families_of_one_campaign_are_fitted_and_held_out(bushfit, tmp_path):
@@ -70,7 +70,7 @@ def test_predict_lays_measurements_over_takes_grids_and_shows_at_most_eight_ampl
     assert set(measured["sweep"]) == {"sweep_axial", "sweep_radial"}
     assert dict(zip(measured["direction"], measured["fitted"], strict=True)) == {"axial": "yes", "radial": "no"}
     assert measured["measured over model [-]"].between(0.95, 1.05).all()
-    axial, radial = (line for line in done.stderr.splitlines() if ": expected error " in line)
+    axial, radial = (line for line in done.text.splitlines() if ": expected error " in line)
     assert (axial.endswith("all fitted)"), radial.endswith("each predicted by a fit without it)")) == (True, True)
     assert 0.3 < float(axial.partition(": expected error ")[2].split()[0]) < 3.0, "in per cent"
     table = pd.read_csv(tmp_path / "x" / "axial.csv")
@@ -79,7 +79,7 @@ def test_predict_lays_measurements_over_takes_grids_and_shows_at_most_eight_ampl
     amplitudes = ", ".join(f"{0.02 * n:.2f}" for n in range(1, 31)) + " mm"
     options = ("--direction", "axial", "--amplitudes", amplitudes, "--no-plots", "-o", tmp_path / "y")
     done = bushfit("predict", "model/model.json", *options)
-    lines = [line.split() for line in done.stderr.splitlines() if line.split()[:1] == ["155"]]
+    lines = [line.split() for line in done.text.splitlines() if line.split()[:1] == ["155"]]
     shown = [words[1] for words in lines]
     value, low, high = (float(lines[0][place].strip("()")) for place in (2, 3, 5))
     first = pd.read_csv(tmp_path / "y/axial.csv").query("`frequency [Hz]` == 155").iloc[0]
@@ -155,8 +155,8 @@ def test_predict_on_a_large_motion_and_on_an_offset(bushfit, tmp_path):
         done = bushfit("predict", "model/model.json", *grid, *over, "-o", tmp_path / name, "--campaign", CAMPAIGN)
         tables[name] = pd.read_csv(tmp_path / name / "axial.csv")
         assert ("measured.csv" in names(tmp_path / name)) is (motion is None)
-        assert (f"axial over {motion}: stiffness" in done.stderr) is (motion is not None)
-        assert ("axial, with the large motion: predicted at strains of" in done.stderr) is (name == "slow")
+        assert (f"axial over {motion}: stiffness" in done.text) is (motion is not None)
+        assert ("axial, with the large motion: predicted at strains of" in done.text) is (name == "slow")
     columns = ["large motion, frequency [Hz]", "large motion, displacement [mm]"]
     assert tables["slow"][columns].to_numpy() == pytest.approx(np.array([[0.5, 1.0]] * 2))
     assert tables["offset"][columns].to_numpy() == pytest.approx(np.array([[0.0, -0.8]] * 2))
@@ -253,8 +253,8 @@ def test_what_keeps_a_target_from_being_met_is_named(root, tmp_path, source, opt
     name, found = next(iter(document(tmp_path / "plan.json")["targets"].items()))
     assert said in found["why"]
     assert not found["met"]
-    assert found["why"] in done.stderr.replace("\n", " ")
-    assert f"these targets are not met: {name}" in done.stderr.replace("\n", " ")
+    assert found["why"] in done.text.replace("\n", " ")
+    assert f"these targets are not met: {name}" in done.text.replace("\n", " ")
 
 
 def test_where_nothing_was_tested_alike_the_compound_is_compared(bushfit, root, tmp_path):
@@ -263,4 +263,4 @@ def test_where_nothing_was_tested_alike_the_compound_is_compared(bushfit, root, 
     table = pd.read_csv(tmp_path / "x/differences.csv")
     assert set(table["direction"]) == {"compound"}
     assert {"strain amplitude [%]", "other modulus [MPa]"} <= set(table)
-    assert "compound: modulus " in done.stderr
+    assert "compound: modulus " in done.text

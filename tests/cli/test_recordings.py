@@ -110,7 +110,7 @@ def test_what_a_file_does_not_tell_is_stated_as_of_csv(typed, tmp_path):
     stated = [f"--column={role}={name}" for role, name in columns.items()]
     stated += ["--unit=time=s", "--unit=displacement=mm", "--unit=force=N"]
     done = typed("init", "axial.mat", *stated, *GEOMETRY, "-o", "x")
-    assert "left out: axial.mat, group oil: " in done.stderr
+    assert "left out: axial.mat, group oil: " in done.text
     assert 'sheet = "top level"' in (tmp_path / "x/campaign.toml").read_text(encoding="utf-8")
     assert "mu" in values(typed("fit-static", "x/campaign.toml", "-o", "y", "--no-plots", "--json"))
     (tmp_path / "axial.mat").rename(tmp_path / "test.mat")

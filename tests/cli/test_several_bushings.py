@@ -104,7 +104,7 @@ def test_predictions_are_of_the_bushing_asked_for(shapes, tmp_path, options, fil
     done = typing(shapes)("predict", "model", *options, "-o", tmp_path / "x", "--no-plots")
     assert {file.stem for file in (tmp_path / "x").glob("*.csv")} == files
     if "measured" in files:
-        assert "expected error" in done.stderr
+        assert "expected error" in done.text
 
 
 @pytest.mark.parametrize(
@@ -121,7 +121,7 @@ def test_a_batch_of_several_bushings_has_their_columns_files_and_limits(shapes, 
     (tmp_path / "limits.toml").write_text(limits, encoding="utf-8")
     batch = ("batch", "batch.toml", "--limits", "limits.toml", "-o", "out", "--jobs", 1)
     done = typing(tmp_path)(*batch, status=1)
-    assert "three_shapes fails: stiffness long axial 25 Hz 0.1 mm 1095 N/mm" in " ".join(done.stderr.split())
+    assert "three_shapes fails: stiffness long axial 25 Hz 0.1 mm 1095 N/mm" in " ".join(done.text.split())
     (row,) = pd.read_csv(tmp_path / "out/batch.csv").to_dict("records")
     assert row["verdict"] == "consistent"
     assert row["stiffness_factor.long [-]"] == pytest.approx(1.033, abs=0.002)
@@ -143,7 +143,7 @@ def test_a_batch_of_several_bushings_has_their_columns_files_and_limits(shapes, 
 )
 def test_an_operating_point_is_of_one_bushing(root, tmp_path, at, problem):
     batch = ("batch", root / "configs/three_shapes.toml", "--at", at, "-o", "out", "--jobs", 1)
-    assert problem in " ".join(typing(tmp_path)(*batch, status=1).stderr.split())
+    assert problem in " ".join(typing(tmp_path)(*batch, status=1).text.split())
 
 
 @pytest.mark.parametrize(
@@ -210,4 +210,4 @@ def test_an_impossible_tie_is_one_error_with_file_and_parameter(bushfit, root, t
 def test_a_tie_that_is_not_used_or_constant_is_reported(bushfit, root, tmp_path, command, tie, said):
     campaign = written(root, tmp_path, "cmp_15961_prior", tie)
     done = bushfit(command, campaign, "-o", tmp_path / "x", "--no-plots", "-v")
-    assert any(" ".join(line.split()).endswith(said) for line in done.stderr.splitlines())
+    assert any(" ".join(line.split()).endswith(said) for line in done.text.splitlines())

@@ -214,4 +214,4 @@ def test_a_name_is_printed_as_it_is(typed, tmp_path):
     (tmp_path / "loop.csv").write_text(loop())
     text = BUSHING.replace('name = "B"', 'name = "a :smile: [red]b"') + LOOP.format("loop.csv")
     (tmp_path / "c.toml").write_text(text)
-    assert "a :smile: [red]b: static fit" in typed("fit-static", "c.toml", "-o", "x", "--no-plots").stderr
+    assert "a :smile: [red]b: static fit" in typed("fit-static", "c.toml", "-o", "x", "--no-plots").stdout

@@ -45,8 +45,8 @@ def test_a_visit_makes_a_campaign_that_fits(typed, visited, tmp_path, table_1, m
         "Bild.png: not a table (by its extension)",
         "alt.xlsx: ",
     ):
-        assert words in done.stderr, done.stderr
-    assert "hidden" not in done.stderr
+        assert words in done.text, done.text
+    assert "hidden" not in done.text
     text = (tmp_path / "x/campaign.toml").read_text(encoding="utf-8")
     entry = next(test for test in tomllib.loads(text)["sweeps"] if test.get("sheet") == "axial")
     assert (entry["temperature"], entry["date"]) == ("23 °C", "2024-05-03")
@@ -61,13 +61,11 @@ def test_a_visit_makes_a_campaign_that_fits(typed, visited, tmp_path, table_1, m
     monkeypatch.setattr("commandline.WIDTH", "50")
     done = typed("fit", "x/campaign.toml", "-o", "fit", "--no-plots", "--json")
     assert values(done) == pytest.approx(table_1, rel=0.04)
-    assert re.search(
-        r"\nmu\n  value: [\d.]+\n  std error: [\d.]+\n  95 % interval: .* to .*\n  unit: MPa\n", done.stderr
-    )
-    assert "and 1 more test has a smaller misfit" in " ".join(done.stderr.split())
-    shown = done.stderr.partition("test by test")[2].partition("and 1 more")[0]
+    assert re.search(r"\nmu\n  value: [\d.]+\n  std error: [\d.]+\n  95 % interval: .* to .*\n  unit: MPa\n", done.text)
+    assert "and 1 more test has a smaller misfit" in " ".join(done.text.split())
+    shown = done.text.partition("test by test")[2].partition("and 1 more")[0]
     assert ("MTS_radial" in shown, "A0,5mm" in shown) == (True, False), "the largest misfits"
-    assert "…" not in done.stderr, "long names wrap"
+    assert "…" not in done.text, "long names wrap"
 
 
 @pytest.mark.parametrize(
