@@ -134,7 +134,8 @@ def _hold_out_inside(before: FitResult, closest: FitResult, correction: Unnamed)
         for name, mask in masks.items():
             if mask.any():
                 chosen.setdefault(name, {})[sweep] = mask
-    columns = process_columns(closest, correction)
+    groups = tuple(patch.directions for patch in correction.patches)
+    columns = process_columns(closest, groups, correction.lengths, correction.size)
     amounts = np.eye(len(columns), closest.residual.size + len(columns), closest.residual.size)  # rows of their prior
     amounts[:, : columns.shape[1]] = columns
     slopes = np.pad(closest.jacobian[closest.inner_indices], ((0, 0), (0, len(columns))))

@@ -12,7 +12,6 @@ from functools import cached_property
 from itertools import product
 
 import numpy as np
-from scipy.linalg import block_diag
 from scipy.special import stdtrit
 
 from bushfit.effects.contract import Array
@@ -21,6 +20,7 @@ from bushfit.effects.unnamed import Patch, Unnamed
 from bushfit.fitting.coordinates import ROUNDING
 from bushfit.fitting.preparation import MeasuredTest, log_slopes, operating_conditions, residual_slices
 from bushfit.fitting.problem import FitResult
+from bushfit.fitting.shared_errors import SharedErrors
 from bushfit.gaussian_process import MAXIMUM_NODES, RestrictedLikelihood, coordinates, in_lengths, patterns
 from bushfit.model.covariance import Z95
 
@@ -49,12 +49,12 @@ class FittedTests:
 
     Args:
         solution: result of the fit, with each test whitened separately.
-        rig_errors: for each test, change of its n whitened residuals due to one standard deviation of each of w errors
-            of the rig, (w, n); empty without such errors.
+        rig_errors: for each test, errors of the rig that its noise lacks, but by which the residuals are whitened as
+            well; empty without such errors.
     """
 
     solution: FitResult
-    rig_errors: Sequence[Array] = ()
+    rig_errors: Sequence[SharedErrors] = ()
 
     @property
     def data_sets(self) -> Sequence[MeasuredTest]:
@@ -94,22 +94,14 @@ class FittedTests:
         return np.concatenate(slopes, axis=-1) * self.solution.coordinates.slopes(model.values)[moving, None]
 
     @cached_property
-    def _blocks(self) -> list[tuple[MeasuredTest, slice, Array | None, Array]]:
-        """Parts of the residuals that a change of the stiffness alters, one entry per test.
-
-        Returns:
-            The test; the slice of its n residuals; orthonormal columns of the two altered combinations of a loop's
-            residuals, (n, 2), or None for a sweep, of which all residuals change; and the changes of the two
-            components, (2, 2), for stiffness changes of 1 and i [N/m or N m/rad].
-        """
-        units, blocks = np.array([[1.0], [1.0j]]), list[tuple[MeasuredTest, slice, Array | None, Array]]()
-        for test, rows in zip(self.data_sets, residual_slices(self.data_sets), strict=True):
-            if test.kind == "loop":
-                directions, components = np.linalg.qr(test.residual_change(units, self.solution.model).T)
-                blocks.append((test, rows, directions, components.T))
-            else:
-                blocks.append((test, rows, None, units))
-        return blocks
+    def _loop_directions(self) -> list[Array | None]:
+        """Orthonormal basis of the two changes that each loop's n residuals can have, (n, 2); None for a sweep."""
+        units = np.ones(self.directions.size) * np.array([[1.0], [1.0j]])
+        changes = self.residual_changes(units / self._stiffness)
+        return [
+            np.linalg.qr(changes[:, block].T)[0] if test.kind == "loop" else None
+            for test, block in zip(self.data_sets, residual_slices(self.data_sets), strict=True)
+        ]
 
     def project(self, rows: Array) -> Array:
         """Reduce whitened residuals of all tests, (..., n), to the d components that the model's stiffness can change.
@@ -117,10 +109,8 @@ class FittedTests:
         Returns:
             Components, (..., d): all residuals of a sweep, and two combinations of the residuals of a loop.
         """
-        parts = [
-            rows[..., block] if directions is None else rows[..., block] @ directions
-            for _, block, directions, _ in self._blocks
-        ]
+        pairs = zip(residual_slices(self.data_sets), self._loop_directions, strict=True)
+        parts = [rows[..., block] if basis is None else rows[..., block] @ basis for block, basis in pairs]
         return np.concatenate(parts, axis=-1)
 
     def residual_changes(self, shapes: Array) -> Array:
@@ -134,26 +124,10 @@ class FittedTests:
         """
         ends = np.cumsum([test.frequency.size for test in self.data_sets])[:-1]
         pairs = zip(self.data_sets, np.split(shapes * self._stiffness, ends, axis=1), strict=True)
-        return np.concatenate([test.residual_change(change, self.solution.model) for test, change in pairs], axis=-1)
-
-    def columns(self, shapes: Array) -> Array:
-        """Convert relative changes of the stiffness into changes of the d components of the residuals, see `project`.
-
-        Args:
-            shapes: c relative changes of the stiffness at the operating points, complex (c, p).
-
-        Returns:
-            Changes of the components, (c, d).
-        """
-        columns, first, changes = [], 0, shapes * self._stiffness
-        for test, _, directions, components in self._blocks:
-            change = changes[:, first : first + test.frequency.size]
-            first += test.frequency.size
-            if directions is None:
-                columns.append(test.residual_change(change, self.solution.model))
-            else:
-                columns.append(np.concatenate((change.real, change.imag), axis=-1) @ components)
-        return np.concatenate(columns, axis=-1)
+        changes = [test.residual_change(change, self.solution.model) for test, change in pairs]
+        if self.rig_errors:
+            changes = [errors.whiten(change) for errors, change in zip(self.rig_errors, changes, strict=True)]
+        return np.concatenate(changes, axis=-1)
 
     @cached_property
     def _stiffness(self) -> Array:
@@ -161,29 +135,20 @@ class FittedTests:
 
     @cached_property
     def remainder(self) -> tuple[Array, Array]:
-        """Part of the residuals that neither the parameters nor errors of the rig explain.
+        """Part of the residuals that the parameters do not explain.
 
         Returns:
-            Orthonormal basis of the changes of the d components (see `project`) by parameters and rig errors, (e, d),
-            and components of the residuals orthogonal to this basis, (d,).
+            Orthonormal basis of the changes of the residuals by the parameters, reduced to the d components of
+            `project`, (e, d); and components of the residuals orthogonal to this basis, (d,).
         """
         rows, residual = self.solution.jacobian, self.solution.residual
-        rig_errors = self.rig_errors or [np.empty((0, test.size)) for test in self.data_sets]
-        pairs = list(zip(self._blocks, rig_errors, strict=True))
-        across = np.concatenate([rows[:, block] @ errors.T for (_, block, *_), errors in pairs], axis=1)
-        among = block_diag(*(errors @ errors.T for errors in rig_errors))
-        information = np.block([[rows @ rows.T, across], [across.T, among + np.eye(len(among))]])
+        information = rows @ rows.T
         scale = np.sqrt(np.maximum(np.diag(information), np.finfo(float).tiny))
         size, vectors = np.linalg.eigh(information / np.outer(scale, scale))
         determined = size > ROUNDING * size.max(initial=0.0)
         mixed = (vectors[:, determined] / np.sqrt(size[determined])).T / scale
-        rig_components = block_diag(
-            *(errors if directions is None else errors @ directions for (_, _, directions, _), errors in pairs)
-        )
-        span = mixed @ np.concatenate((self.project(rows), rig_components))
-        slopes = [rows @ residual, *(errors @ residual[block] for (_, block, *_), errors in pairs)]
-        absorbed = mixed @ np.concatenate(slopes)
-        return span, self.project(residual) - absorbed @ span
+        span = mixed @ self.project(rows)
+        return span, self.project(residual) - (mixed @ (rows @ residual)) @ span
 
 
 @dataclass(frozen=True, eq=False)
@@ -240,10 +205,15 @@ class Discrepancy:
         return np.concatenate((self.shapes, 1j * self.shapes))
 
     @cached_property
+    def columns(self) -> Array:
+        """Changes of the d components of the residuals by each complex shape of the process, (2 q, d)."""
+        return self.tests.project(self.tests.residual_changes(self.complex_shapes))
+
+    @cached_property
     def likelihood(self) -> RestrictedLikelihood:
         """Restricted likelihood of the standard deviation of the model's error, relative to |K|, given the tests."""
         span, remainder = self.tests.remainder
-        return RestrictedLikelihood.from_columns(self.tests.columns(self.complex_shapes), remainder, span)
+        return RestrictedLikelihood.from_columns(self.columns, remainder, span)
 
     @cached_property
     def best(self) -> tuple[float, float]:
@@ -258,7 +228,7 @@ class Discrepancy:
             Mean relative error of the model at the operating points, complex (p,), and the standard deviation of its
             real and imaginary parts, errors of the parameters included, (2, p).
         """
-        size, columns, rows = self.best[1], self.tests.columns(self.complex_shapes), self.tests.free_jacobian
+        size, columns, rows = self.best[1], self.columns, self.tests.free_jacobian
         inverse = np.linalg.inv(columns @ columns.T + np.eye(len(columns)) / size**2)
         mean = (-inverse @ columns @ self.tests.project(self.tests.solution.residual)) @ self.complex_shapes
         both = np.concatenate((columns, self.tests.project(rows)))
@@ -319,16 +289,17 @@ def discrepancies(tests: FittedTests) -> list[Discrepancy]:
     return [Discrepancy.over_tests(tests, groups, lengths, MAXIMUM_NODES) for groups, lengths in pairs]
 
 
-def process_columns(solution: FitResult, correction: Unnamed) -> Array:
-    """Changes of a fit's residuals due to the Gaussian process that a correction of its model describes.
+def process_columns(solution: FitResult, groups: Groups, lengths: tuple[float, float], size: float) -> Array:
+    """Changes of a fit's residuals due to the Gaussian process of a model's error.
 
     Args:
-        solution: fit of the model without the correction.
-        correction: correction, which determines size, lengths and groups of the process.
+        solution: fit of the model.
+        groups: groups of directions or specimens; the members of a group share one error.
+        lengths: correlation lengths in ln frequency and ln strain.
+        size: standard deviation of the process, relative to |K|.
 
     Returns:
         Change of the n whitened residuals for each of q independent patterns, at one standard deviation, (q, n).
     """
-    tests, groups = FittedTests(solution), tuple(patch.directions for patch in correction.patches)
-    process = Discrepancy.over_tests(tests, groups, correction.lengths, MAXIMUM_NODES)
-    return tests.residual_changes(correction.size * process.complex_shapes)
+    process = Discrepancy.over_tests(FittedTests(solution), groups, lengths, MAXIMUM_NODES)
+    return process.tests.residual_changes(size * process.complex_shapes)

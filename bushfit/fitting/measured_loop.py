@@ -215,9 +215,13 @@ class MeasuredLoop(MeasuredBase):
             model: not used for a loop.
             added: not used for a loop.
         """
+        return np.concatenate((change.real, change.imag), axis=-1) @ self._stiffness_changes
+
+    @cached_property
+    def _stiffness_changes(self) -> Array:
+        """Changes of the whitened residuals due to a stiffness of 1 and of i [N/m or N m/rad], (2, size)."""
         wave = self.coefficients[1] * np.exp(2j * np.pi * self.phase)
-        per_unit = self.whiten(np.array([wave.real, -wave.imag]) * self._per_noise)
-        return np.concatenate((change.real, change.imag), axis=-1) @ per_unit
+        return self.whiten(np.array([wave.real, -wave.imag]) * self._per_noise)
 
     def relative_difference(self, model: Model) -> Array:
         """Model minus measured force at each row, relative to half the measured force range, (1, n)."""

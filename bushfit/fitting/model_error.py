@@ -26,7 +26,6 @@ import numpy as np
 from bushfit.campaign.schema import UNSTATED, RigSettings
 from bushfit.caveat import Caveat
 from bushfit.effects import BASE
-from bushfit.effects.contract import Array
 from bushfit.effects.unnamed import Unnamed
 from bushfit.errors import FitError, ModelError
 from bushfit.fitting.assess import excess_chi_square
@@ -41,6 +40,7 @@ from bushfit.fitting.discrepancy import (
     FittedTests,
     averaged,
     discrepancies,
+    process_columns,
 )
 from bushfit.fitting.levels import LevelErrors, level_error_columns, level_errors
 from bushfit.fitting.noise import SweepNoise
@@ -125,10 +125,9 @@ def with_model_error(
     """
     if not plain_fit.names:
         return plain_fit, None
-    if not (certain or _exceeds_noise(plain_fit, rig)):
-        thinned = _thin_sweeps(plain_fit.problem.tests)
-        rig_errors = [_errors_of_class(test, rig) for test in thinned]
-        if not _is_smooth(FittedTests(plain_fit.reevaluate(plain_fit.model, thinned), rig_errors)):
+    if not (certain or _exceeds_noise(_with_rig_errors(plain_fit, rig))):
+        thinned = plain_fit.reevaluate(plain_fit.model, _thin_sweeps(plain_fit.problem.tests))
+        if not _is_smooth(_with_rig_errors(thinned, rig)):
             return plain_fit, None
     closest, size = closest_fit(plain_fit, bounds)
     if size >= SIZES[-1]:  # that is no error of a model, but another thing than it
@@ -142,10 +141,9 @@ def with_model_error(
     if error.rms >= SIZES[-1]:
         return plain_fit, None
     weighed = [test.with_model_error(size) for test in plain_fit.covariance_tests or with_levels]
-    fitted = FittedTests(closest.reevaluate(closest.model, weighed))
-    whole = Discrepancy.over_tests(fitted, likeliest.groups, likeliest.lengths, MAXIMUM_NODES)
-    columns = whole.tests.residual_changes(likeliest.best[1] * whole.complex_shapes)
-    process = SmoothError(columns, likeliest.likelihood.freedom(likeliest.best[1]))
+    fitted, likeliest_size = closest.reevaluate(closest.model, weighed), likeliest.best[1]
+    columns = process_columns(fitted, likeliest.groups, likeliest.lengths, likeliest_size)
+    process = SmoothError(columns, likeliest.likelihood.freedom(likeliest_size))
     closest = replace(closest, noise_weighted=plain_fit.data_sets, outliers=plain_fit.outliers)
     return replace(closest, covariance_tests=weighed, smooth_error=process), error
 
@@ -251,7 +249,7 @@ def log_likelihood(solution: FitResult, prior_precision: Mapping[str, float]) ->
     information, gain = rows @ rows.T, 0.0
     if size:
         components, processes = tests.project(residual), discrepancies(tests)
-        columns = [process.tests.columns(process.complex_shapes) for process in processes]
+        columns = [process.columns for process in processes]
         likelihoods = [
             RestrictedLikelihood.from_columns(rows, components, np.empty((0, components.size))) for rows in columns
         ]
@@ -271,12 +269,10 @@ def log_likelihood(solution: FitResult, prior_precision: Mapping[str, float]) ->
     return gain - 0.5 * (float(residual @ residual) + log_size)
 
 
-def _exceeds_noise(solution: FitResult, rig: RigSettings) -> bool:
-    """True if chi-square, of all tests or of one, is too large for the noise and for rig errors of the stated size."""
-    squares, counts = [], [test.residual_count for test in solution.problem.tests]
-    for test, rows in zip(solution.problem.tests, residual_slices(solution.problem.tests), strict=True):
-        whitened = SharedErrors.from_columns(_errors_of_class(test, rig)).whiten(solution.residual[rows])
-        squares.append(float(np.sum(np.square(whitened))))
+def _exceeds_noise(tests: FittedTests) -> bool:
+    """True if chi-square, of all tests or of one, is too large for the noise and the errors of the rig."""
+    solution, counts = tests.solution, [test.residual_count for test in tests.data_sets]
+    squares = [float(np.sum(np.square(solution.residual[rows]))) for rows in residual_slices(tests.data_sets)]
     freedom = max(sum(counts) - len(solution.names), 1)
     pairs = [(sum(squares), freedom), *zip(squares, counts, strict=True)]
     return any(excess_chi_square(square / count, count) is not None for square, count in pairs if count)
@@ -314,18 +310,24 @@ def _with_unseen_level_errors(tests: Sequence[MeasuredTest], rig: RigSettings) -
     return with_sweep_noise(tests, with_level)
 
 
-def _errors_of_class(test: MeasuredTest, rig: RigSettings) -> Array:
-    """Changes of a test's n whitened residuals due to one standard deviation of each of w rig errors, (w, n).
+def _with_rig_errors(solution: FitResult, rig: RigSettings) -> FittedTests:
+    """Whiten the residuals of a fit by errors of the rig that the estimated noise does not contain.
 
-    The errors are the gain error of a loop, or a gain and a phase error at each constant amplitude or frequency of a
-    sweep. The estimated noise does not contain them; their size is the one that [rig] states or bushfit assumes.
+    These errors are the gain error of a loop, or a gain and a phase error at each constant amplitude or frequency of a
+    sweep, of the size that [rig] states or bushfit assumes.
     """
-    if isinstance(test, MeasuredLoop):
-        gain = test.gain_error * test.gain_and_offset()[:1]
-        return gain[:0] if test.gain_weighs else gain
-    uncounted = np.sqrt(np.maximum(np.square(class_errors(rig)) - np.square(test.noise.level), 0.0))
-    columns = level_error_columns(test)
-    return columns * np.tile(uncounted, len(columns) // 2)[:, None]
+    tests, residual, jacobian = solution.problem.tests, solution.residual.copy(), solution.jacobian.copy()
+    rig_errors = list[SharedErrors]()
+    for test, rows in zip(tests, residual_slices(tests), strict=True):
+        if isinstance(test, MeasuredLoop):
+            columns = test.gain_and_offset()[: not test.gain_weighs] * test.gain_error
+        else:
+            uncounted = np.sqrt(np.maximum(np.square(class_errors(rig)) - np.square(test.noise.level), 0.0))
+            columns = level_error_columns(test)
+            columns *= np.tile(uncounted, len(columns) // 2)[:, None]
+        rig_errors.append(errors := SharedErrors.from_columns(columns))
+        residual[rows], jacobian[:, rows] = errors.whiten(residual[rows]), errors.whiten(jacobian[:, rows])
+    return FittedTests(replace(solution, residual=residual, jacobian=jacobian), rig_errors)
 
 
 def _thin_sweeps(tests: Sequence[MeasuredTest], error: float = 0.0) -> list[MeasuredTest]:
