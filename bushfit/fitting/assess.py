@@ -200,14 +200,13 @@ def excess_chi_square(chi_square: float, freedom: int) -> float | None:
     return chi_square if chi_square > 1.0 + _LACK_OF_FIT * np.sqrt(2.0 / freedom) else None
 
 
-def misfit_warnings(model: Model, data_sets: Sequence[MeasuredTest], parameters: int, advice: str = "") -> list[Caveat]:
+def misfit_warnings(model: Model, data_sets: Sequence[MeasuredTest], parameters: int) -> list[Caveat]:
     """Warning that the model misses all tests together, or one test, by more than the noise.
 
     Args:
         model: fitted model.
         data_sets: tests.
         parameters: number of fitted parameters.
-        advice: text to append to the sentence.
 
     Returns:
         List with the warning; empty if the model fits.
@@ -220,7 +219,7 @@ def misfit_warnings(model: Model, data_sets: Sequence[MeasuredTest], parameters:
     in_worst = f", {number(by_test[worst], 2)} in {worst}" if len(data_sets) > 1 and worst else ""
     sentence = (
         f"the model misses the data by more than their noise (reduced chi-square {number(chi_square, 2)}{in_worst}): "
-        f"intervals are invalid, though standard errors are scaled up{advice}"
+        f"intervals are invalid, though standard errors are scaled up"
     )
     return [Caveat("misfit", sentence)]
 
@@ -361,13 +360,12 @@ def mixed_condition_warnings(data_sets: Sequence[MeasuredTest]) -> list[Caveat]:
     return warnings
 
 
-def unfitted_warnings(model: Model, data_sets: Sequence[MeasuredTest], advice: str) -> list[Caveat]:
+def unfitted_warnings(model: Model, data_sets: Sequence[MeasuredTest]) -> list[Caveat]:
     """Warnings about tests that a model was not fitted to and misses by more than their noise, one for each direction.
 
     Args:
         model: fitted model.
         data_sets: tests that were not fitted.
-        advice: text to append to each sentence.
 
     Returns:
         Warnings; empty if the model predicts all these tests within their noise.
@@ -384,6 +382,6 @@ def unfitted_warnings(model: Model, data_sets: Sequence[MeasuredTest], advice: s
             smallest, largest = (number(end(share for _, share, _ in found), 2) for end in (min, max))
             missed = f"were not fitted, and the model misses them by {smallest} to {largest} % (NRMSE), {worst} by"
         subject = f"{worst}, {place}," if len(found) == 1 else f"{len(found)} tests, {place},"
-        sentence = f"{subject} {missed} {number(noises, 2)} times its noise{advice}"
+        sentence = f"{subject} {missed} {number(noises, 2)} times its noise"
         warnings.append(Caveat("unfitted_test_missed", sentence))
     return warnings

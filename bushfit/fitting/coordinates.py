@@ -125,13 +125,7 @@ def coordinate_changes(model: Model, names: Sequence[str], changed: Sequence[str
     Returns:
         Derivatives, (k, c).
     """
-    changes = np.zeros((len(names), len(changed)))
-    by_value = model.constraints.slopes(model.values, names)
-    sizes = [Coordinates.of_parameters(model, group).slopes(model.values) for group in (names, model.tied)]
-    for column, name in enumerate(changed):
-        if name in model.tied:
-            tie = model.tied.index(name)
-            changes[:, column] = by_value[:, tie] * sizes[0] / sizes[1][tie]
-        elif name in names:
-            changes[list(names).index(name), column] = 1.0
-    return changes
+    sizes = Coordinates.of_parameters(model, (*names, *model.tied)).slopes(model.values)
+    by_value = np.hstack((np.eye(len(names)), model.constraints.slopes(model.values, names)))
+    by_name = dict(zip((*names, *model.tied), (by_value * sizes[: len(names), None] / sizes).T, strict=True))
+    return np.array([by_name.get(name, np.zeros(len(names))) for name in changed]).reshape(len(changed), len(names)).T

@@ -15,7 +15,6 @@ from bushfit.fitting.noise import SweepNoise
 from bushfit.fitting.outliers import contradictions, outlying_points
 from bushfit.fitting.repeats import FLOOR
 from bushfit.fitting.shared_errors import SharedErrors
-from bushfit.fitting.whitening import Whitening
 from bushfit.model.model import Model
 from bushfit.model.result import Outlier
 from bushfit.reading.measurement import Sweep
@@ -37,7 +36,7 @@ class MeasuredSweep(MeasuredBase):
 
     `MeasuredBase` documents the methods of every test. Points are sorted by run (constant value, repeat), then by step;
     a run is a block. The residual ln(K/K_meas) of model K has the gain error in its real and the phase error in its
-    imaginary part.
+    imaginary part. A line is the set of all runs with the same constant value.
 
     Args:
         test: measured data.
@@ -52,6 +51,12 @@ class MeasuredSweep(MeasuredBase):
             number of the run.
         step: value that changes from point to point of the run, (n,): frequency [Hz] or amplitude [m or rad].
         repeat: number of the repeat of each point, (n,).
+
+    Notes:
+        Within a block of points with scatter s_i and a shared error t the covariance is V = diag(s_i^2) + t^2 1 1^T.
+        All runs of a line may also share an error, u^2 1 1^T over the line. A deviation is whitened by dividing it by s_i
+        and removing the error shared by its block; then the error shared by its line is removed in the same way. A
+        point of weight w has s_i^2 = s^2/w; a point of weight 0 has no effect, not even on shared errors.
     """
 
     test: Sweep
@@ -232,20 +237,43 @@ class MeasuredSweep(MeasuredBase):
         return (self.measured.real / np.abs(self.measured)) ** 2
 
     @cached_property
-    def covariance(self) -> Whitening:
-        """Covariance of the noise of the n log gains and n phases [rad], by which the residuals are whitened."""
-        random = self.noise.scatter(self.name, self.held_value, self.step)
+    def scatter(self) -> Array:
+        """Standard deviation from point to point of the gain and of the phase [rad] at full weight, (2, n)."""
         if self.test.relative_error is not None and self.test.noise is None:
-            random = np.maximum(np.tile(self.test.relative_error[self.order], (2, 1)), FLOOR)
-        run = np.repeat(np.arange(self.block_starts.size), np.diff(self.block_starts, append=self.order.size))
-        line = np.unique(self.held_value, return_inverse=True)[1]
-        return Whitening(run, line, random, self.noise, self.weights)
+            return np.maximum(np.tile(self.test.relative_error[self.order], (2, 1)), FLOOR)
+        return self.noise.scatter(self.name, self.held_value, self.step)
+
+    @cached_property
+    def per_scatter(self) -> Array:
+        """Reciprocal of the scatter of each deviation, of n gains, then of n phases, (2 n,); 0 without weight."""
+        return (np.sqrt(self.weights) / self.scatter).ravel()
+
+    @cached_property
+    def _run(self) -> Array:
+        """Index of the run of each residual: of n gains, then of n phases, (2 n,)."""
+        starts = self.block_starts
+        run = np.repeat(np.arange(starts.size), np.diff(starts, append=self.order.size))
+        return np.concatenate((run, run + starts.size))
+
+    @cached_property
+    def run_errors(self) -> SharedErrors:
+        """Errors shared by the points of each run, acting on deviations in units of their scatter."""
+        return SharedErrors.of_groups(self._run[: self.order.size], self.per_scatter, self.noise.shared)
+
+    def _line_errors(self, per_scatter: Array) -> SharedErrors:
+        """Errors shared by the runs of each line, acting on deviations multiplied by `per_scatter`, (2 n,)."""
+        return SharedErrors.of_groups(np.unique(self.held_value, return_inverse=True)[1], per_scatter, self.noise.level)
+
+    @cached_property
+    def line_errors(self) -> SharedErrors:
+        """Errors shared by the runs of each line, acting on deviations already whitened by the errors of runs."""
+        return self._line_errors(self.per_scatter / np.hypot(1.0, self.run_errors.deviations)[self._run])
 
     @cached_property
     def unit_model_error(self) -> SharedErrors:
         """Model error of 100 % of |K| (standard deviation) in phase and in quadrature; repeats of a point share it."""
         points = np.unique(self.frequency + 1j * self.amplitude, return_inverse=True)[1]
-        return SharedErrors.of_groups(points, self.covariance.per_scatter, (1.0, 1.0))
+        return SharedErrors.of_groups(points, self.per_scatter, (1.0, 1.0))
 
     def whiten(self, difference: Array) -> Array:
         """Divide deviations by their noise and remove the correlation that errors shared by points cause.
@@ -261,12 +289,47 @@ class MeasuredSweep(MeasuredBase):
             Whitened residuals in units of noise, (..., 2 n): n gains, then n phases.
         """
         with np.errstate(invalid="ignore"):
-            rows = np.concatenate((difference.real, difference.imag), axis=-1) * self.covariance.per_scatter
-            return self.model_errors.whiten(rows) if self.model_error else self.covariance.whiten(rows)
+            rows = np.concatenate((difference.real, difference.imag), axis=-1) * self.per_scatter
+            return self.model_errors.whiten(rows) if self.model_error else self._whiten(rows)
+
+    def _whiten(self, rows: Array) -> Array:
+        """Remove the correlation by the noise that points share from deviations in units of scatter, (..., 2 n)."""
+        return self.line_errors.whiten(self.run_errors.whiten(rows))
 
     def noise_sensitivity(self, influence: Array) -> dict[Hashable, Array]:
-        """Sensitivity of k parameter estimates to the error of each estimated noise variance; see `Whitening`."""
-        return self.covariance.noise_sensitivity(influence)
+        """Change of k parameter estimates by an error of each noise variance that was estimated from the tests.
+
+        Args:
+            influence: weight of each whitened residual in the estimates, (k, 2 n).
+
+        Returns:
+            Sensitivity by identifier of the noise variance, (k, 2 n) each; see `MeasuredLoop.noise_sensitivity`.
+
+        Notes:
+            Within a block the derivatives of V are I with respect to s^2 and 1 1^T with respect to t^2; whitened, W^2
+            and (W 1)(W 1)^T. The estimate of t^2 is a mean of `freedom` squares with expectation t^2 + s^2/n; its error
+            is limited to t^2. The same applies to errors shared by lines.
+        """
+        runs, lines, noise, reactions = self.run_errors, self.line_errors, self.noise, dict[str, Array]()
+        rows = lines.whiten(influence)
+        if noise.scatter_freedom:
+            reactions["scatter"] = self._whiten(runs.whiten(rows)) * np.sqrt(2.0 / noise.scatter_freedom)
+        if noise.freedom:
+            variance = np.square(runs.deviations)
+            _, first, counts = np.unique(self._run, return_index=True, return_counts=True)
+            scatter = np.bincount(self._run, np.square(self.per_scatter)) * np.square(self.scatter.ravel()[first])
+            error = np.minimum((variance + scatter / counts) * np.sqrt(2.0 / noise.freedom), variance)
+            reactions["shared"] = lines.whiten(runs.multiply(rows, error / (1.0 + variance)))
+        if noise.level_freedom:
+            variance = np.square(lines.deviations)
+            error = np.minimum((variance + 1.0) * np.sqrt(2.0 / noise.level_freedom), variance)
+            reactions["level"] = lines.multiply(rows, error / np.hypot(1.0, lines.deviations))
+        is_gain = np.arange(self.size) < self.order.size
+        return {
+            (id(noise), kind, part): reaction * only
+            for kind, reaction in reactions.items()
+            for part, only in enumerate((is_gain, ~is_gain))
+        }
 
     def extra_covariance(self, influence: Array) -> Array:
         """Covariance to add to that of k parameter estimates, for errors that the weights of the fit lack, (k, k).
@@ -277,9 +340,8 @@ class MeasuredSweep(MeasuredBase):
         Args:
             influence: change of each estimate per unit of each whitened residual, (k, 2 n).
         """
-        noise, whitened = self.covariance, self.model_errors.whiten(influence)
-        lines = SharedErrors.of_groups(noise.line, noise.per_scatter, self.noise.level)
-        added = noise.runs.covariance(whitened) + lines.covariance(whitened)
+        whitened = self.model_errors.whiten(influence)
+        added = self.run_errors.covariance(whitened) + self._line_errors(self.per_scatter).covariance(whitened)
         return np.asarray(added - self.model_errors.covariance(whitened))
 
     def with_independent_noise(self) -> Self:
@@ -291,33 +353,41 @@ class MeasuredSweep(MeasuredBase):
         difference = (self.response(model) - self.measured) / np.abs(self.measured)
         return np.stack((difference.real, difference.imag))
 
-    def scaled_distance(self, deviation: Array, *, shared: bool = True) -> Array:
-        """Magnitude of each point's deviation in units of the scatter from point to point, (n,).
+    def scaled(self, deviation: Array, *, shared: bool = True) -> Array:
+        """Divide the deviations in gain and phase by the scatter of each point, without whitening.
 
         Args:
             deviation: relative differences in magnitude + i differences in phase [rad], complex (n,).
             shared: True to subtract the likeliest error that all points of a run share.
+
+        Returns:
+            Gain and phase of each point in units of the scatter, (2, n).
         """
-        return np.hypot(*self.covariance.scaled(deviation, shared=shared))
+        rows = np.concatenate((deviation.real, deviation.imag))
+        if shared:
+            squares = np.square(self.per_scatter)
+            sums, weights = (np.bincount(self._run, values) for values in (rows * squares, squares))
+            variance = np.repeat(np.square(self.noise.shared) + np.square(self.noise.level), weights.size // 2)
+            rows = rows - (sums * variance / (1.0 + variance * weights))[self._run]
+        return rows.reshape(2, -1) / self.scatter
 
     def distance(self, model: Model) -> Array:
         """Distance of each point from the model in units of noise, (n,): root mean square of gain and phase deviation.
 
         The likeliest error that all points of a run share is subtracted first.
         """
-        return self.scaled_distance(self.deviation(self.response(model))) / np.sqrt(2.0)
+        return np.hypot(*self.scaled(self.deviation(self.response(model)))) / np.sqrt(2.0)
 
     def displayed_residual(self, model: Model) -> Array:
         """Whitened residuals for charts, (2 n,); those of points without weight are in units of the scatter alone."""
         deviation = self.deviation(self.response(model))
-        distances = self.covariance.scaled(deviation).ravel()
-        return np.where(np.tile(self.weights > 0.0, 2), self.whiten(deviation), distances)
+        return np.where(np.tile(self.weights > 0.0, 2), self.whiten(deviation), self.scaled(deviation).ravel())
 
     def outlier_indices(self, model: Model) -> Array:
         """Indices of the points that are farther from the model and from their neighbours than noise explains, (k,)."""
         points, freedom = np.stack((self.frequency, self.amplitude)), self.noise.scatter_freedom or np.inf
         deviation = self.deviation(self.response(model))
-        return outlying_points(deviation, self.scaled_distance, self.block_starts, points, freedom)
+        return outlying_points(deviation, self.scaled, self.block_starts, points, freedom)
 
     def outliers(self, points: Array, model: Model) -> Iterator[Outlier]:
         """Yield file, row and distance from the model of the outliers with the indices `points`."""

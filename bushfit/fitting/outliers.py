@@ -127,7 +127,7 @@ def _run_lengths(mask: Array) -> Array:
 
 
 def outlying_points(
-    deviation: Array, distance_of: Callable[..., Array], starts: Array, points: Array, freedom: float
+    deviation: Array, scaled: Callable[..., Array], starts: Array, points: Array, freedom: float
 ) -> Array:
     """Find points of a sweep that are farther from the model and from their neighbours than noise explains.
 
@@ -137,8 +137,8 @@ def outlying_points(
 
     Args:
         deviation: deviation of each point from the model, gain + i phase, complex (n,).
-        distance_of: function from deviations to distances in units of noise; with `shared=False` the errors shared by a
-            block are not subtracted.
+        scaled: function from deviations to gain and phase in units of noise, (2, n); with `shared=False` the errors
+            shared by a block are not subtracted.
         starts: index of the first point of each block (run).
         points: frequency and amplitude of each point, (2, n); points with equal values are repeats.
         freedom: degrees of freedom behind the noise; inf if the noise is known.
@@ -146,19 +146,17 @@ def outlying_points(
     Returns:
         Indices of the outliers, (k,).
     """
-    distance = distance_of(deviation)
+    distance = np.hypot(*scaled(deviation))
     by_noise = outlier_limit(deviation.size, 2, freedom)
     limit = by_noise * misfit_scale(distance, 2)
     far = distance > limit
     local = _from_neighbours(deviation, starts, _FEW_NEIGHBOURS)
     _, point_index = np.unique(points, axis=1, return_inverse=True)
     repeats, from_repeats = _from_repeats(local, point_index)
-    alone = np.minimum(
-        distance_of(local, shared=False), np.where(repeats > 0, distance_of(from_repeats, shared=False), np.inf)
-    )
     against = _from_neighbours(_from_repeats(deviation, point_index)[1], starts, NEIGHBOURS)
-    # the median of n repeats has pi/(2 n) of the variance of one
-    agreed = distance_of(against, shared=False) / np.sqrt(1.0 + np.pi / 2.0 / np.maximum(repeats, 1))
+    alone, repeated, agreed = (np.hypot(*scaled(part, shared=False)) for part in (local, from_repeats, against))
+    alone = np.minimum(alone, np.where(repeats > 0, repeated, np.inf))
+    agreed /= np.sqrt(1.0 + np.pi / 2.0 / np.maximum(repeats, 1))  # the median of n repeats: pi/(2 n) of the variance
     farthest = np.zeros(point_index.max() + 1)
     np.maximum.at(farthest, point_index, agreed)
     apart_from_repeats = agreed > by_noise * misfit_scale(agreed[repeats > 1], 2)

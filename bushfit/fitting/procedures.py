@@ -49,8 +49,9 @@ _MOST_PASSES = 50
 _STRIDES = (-0.5, 5.0)
 #: Springpot of a typical filled natural rubber, m/mu [s^alpha] and alpha, to estimate the effect of leaving it out.
 _TYPICAL_SPRINGPOT = (0.18, 0.24)
-#: Advice at the end of warnings about a model that does not fit.
+#: Advice at the end of warnings about a model that does not fit, and the kinds of these warnings.
 NEXT = "; bushfit diagnose looks for what is missing"
+_ADVISED = ("misfit", "model_error", "levels_disagree", "unfitted_test_missed")
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,13 +104,14 @@ def fit_joint(
         return estimate(replace(problem, model=found.model, tests=with_errors), robust=data.robust)
 
     found, error, notes = with_excess_errors(found, data.bounds, data.campaign.rig, refit)
-    notes = [replace(note, text=note.text + NEXT) for note in notes]
-    notes += unfitted_warnings(found.model, unused, NEXT)
-    usable = expected_errors(found.model, found.problem.tests, unused, found)
-    result = build_result([found], data.bounds, unused=unused, advice=NEXT)
-    result = replace(result, usable=usable, model_error=error, alternatives=alternative_preload_law(found))
-    result = _with_campaign(data, [found], result, notes)
-    return replace(result, profile=profile95(found, result.covariance)) if profile else result
+    result = _campaign_result(data, [found], [*notes, *unfitted_warnings(found.model, unused)], unused=unused)
+    return replace(
+        result,
+        usable=expected_errors(found.model, found.problem.tests, unused, found),
+        model_error=error,
+        alternatives=alternative_preload_law(found),
+        profile=profile95(found, result.covariance) if profile else {},
+    )
 
 
 def fit_static(data: PreparedCampaign, springpot: Result | None = None) -> Result:
@@ -132,11 +134,9 @@ def fit_static(data: PreparedCampaign, springpot: Result | None = None) -> Resul
     fixed = {name: values[name] for name in DYNAMIC if name in values}
     if len(fixed) < len(DYNAMIC):
         found = _fit_without_springpot(data)
-        result = build_result([found], data.bounds, advice=NEXT)
-        return _with_campaign(data, [found], result, [_springpot_warning(data, found)])
+        return _campaign_result(data, [found], [_springpot_warning(data, found)])
     uncertainty = springpot.covariance.restricted(DYNAMIC) if springpot else None
-    found = _fit_step(data, data.static_loops(), BASE, fixed)
-    return _with_campaign(data, [found], build_result([found], data.bounds, fixed=uncertainty, advice=NEXT))
+    return _campaign_result(data, [_fit_step(data, data.static_loops(), fixed)], fixed=uncertainty)
 
 
 def fit_dynamic(data: PreparedCampaign, static: Result) -> Result:
@@ -149,9 +149,8 @@ def fit_dynamic(data: PreparedCampaign, static: Result) -> Result:
         static: result of the static fit, with mu, sigma_fmax and eps_half.
     """
     fixed = {name: static.model.values[name] for name in STATIC}
-    found = _fit_step(data, [data.smallest_sweep], BASE, fixed)
-    result = build_result([found], data.bounds, fixed=static.covariance.restricted(STATIC), advice=NEXT)
-    return _with_campaign(data, [found], result)
+    found = _fit_step(data, [data.smallest_sweep], fixed)
+    return _campaign_result(data, [found], fixed=static.covariance.restricted(STATIC))
 
 
 def given_static(data: PreparedCampaign) -> Result | None:
@@ -181,13 +180,12 @@ def fit_two_step(data: PreparedCampaign) -> TwoStep:
     springpot, passes = dict[str, float](), list[Mapping[str, float]]()
     points, images, model = list[Array](), list[Array](), None
     while len(passes) < _MOST_PASSES:
-        static = _fit_step(data, loops, BASE, springpot, model) if springpot else _fit_without_springpot(data)
-        dynamic = _fit_step(data, [sweep], BASE, {name: static.model.values[name] for name in STATIC}, model)
+        static = _fit_step(data, loops, springpot, model) if springpot else _fit_without_springpot(data)
+        dynamic = _fit_step(data, [sweep], {name: static.model.values[name] for name in STATIC}, model)
         model, before = dynamic.model, passes[-1] if passes else {}
         passes.append(dict(model.values))
         if all(abs(before.get(name, np.inf) - value) <= _AGREED * abs(value) for name, value in passes[-1].items()):
-            result = build_result([static, dynamic], data.bounds, advice=NEXT)
-            return TwoStep(tuple(passes), _with_campaign(data, [static, dynamic], result))
+            return TwoStep(tuple(passes), _campaign_result(data, [static, dynamic]))
         coordinates = Coordinates.of_parameters(model, DYNAMIC)
         if springpot:
             points.append(coordinates.point(springpot))
@@ -211,7 +209,7 @@ def fit_two_step(data: PreparedCampaign) -> TwoStep:
 @lru_cache(maxsize=1)  # the static fit, and the first pass of the two steps
 def _fit_without_springpot(data: PreparedCampaign) -> FitResult:
     """Fit mu, sigma_fmax and eps_half to the loops by a model without the springpot."""
-    return _fit_step(data, data.static_loops(), ("elastic", "friction"), {})
+    return _fit_step(data, data.static_loops(), {})
 
 
 def _springpot_warning(data: PreparedCampaign, static: FitResult) -> Caveat:
@@ -224,7 +222,7 @@ def _springpot_warning(data: PreparedCampaign, static: FitResult) -> Caveat:
     else:
         ratio, alpha = _TYPICAL_SPRINGPOT
         fixed = {"m": ratio * values["mu"], "alpha": alpha}
-        better = _fit_step(data, static.problem.tests, BASE, fixed).model.values
+        better = _fit_step(data, static.problem.tests, fixed).model.values
         source = f"With the springpot of a typical filled rubber (m = {ratio} mu s^alpha, alpha = {alpha})"
     changes = ", ".join(f"{name} by {100 * (better[name] / values[name] - 1):+.1f} %" for name in STATIC)
     return Caveat(
@@ -236,59 +234,58 @@ def _springpot_warning(data: PreparedCampaign, static: FitResult) -> Caveat:
 
 
 def _fit_step(
-    data: PreparedCampaign,
-    tests: Sequence[MeasuredTest],
-    effects: Sequence[str],
-    fixed: Mapping[str, float],
-    start: Model | None = None,
+    data: PreparedCampaign, tests: Sequence[MeasuredTest], fixed: Mapping[str, float], start: Model | None = None
 ) -> FitResult:
     """Fit one step of the paper's procedure with lmfit.
 
     Args:
         data: prepared campaign.
         tests: tests to fit.
-        effects: names of the effects of the model.
-        fixed: values of parameters that this step keeps fixed, by name [SI].
+        fixed: values of parameters that this step keeps fixed, by name [SI]; without any, the model has no springpot.
         start: model of the last pass, from which the fit starts; None to start from values estimated from the tests.
     """
+    effects = BASE if fixed else ("elastic", "friction")
     model = start.with_values(fixed) if start else data.starting_model(effects, tests, fixed)
     return estimate(data.problem(model, tests, fixed), robust=data.robust, lmfit=True)
 
 
-def _with_campaign(
-    data: PreparedCampaign, steps: Sequence[FitResult], result: Result, notes: Sequence[Caveat] = ()
+def _campaign_result(
+    data: PreparedCampaign,
+    steps: Sequence[FitResult],
+    notes: Sequence[Caveat] = (),
+    *,
+    fixed: Covariance | None = None,
+    unused: Sequence[MeasuredTest] = (),
 ) -> Result:
-    """Add the specimens, the outliers and the warnings on the campaign to the result of a procedure.
+    """Build the result of a procedure, with the specimens, the outliers and the warnings on the campaign.
 
     Args:
         data: prepared campaign.
         steps: fits of the procedure, in order.
-        result: result of these fits.
         notes: warnings to report first.
+        fixed: covariance of parameters that all fits kept fixed; None if these are exact.
+        unused: tests that no fit used, to compare the model with.
     """
-    model, tests = result.model, [test for step in steps for test in step.data_sets]
+    model, tests = steps[-1].model, [test for step in steps for test in step.data_sets]
     outliers = tuple(outlier for step in steps for outlier in step.outliers)
-    warnings = (
+    warnings = [
         *notes,
         *implausible_modulus(data.campaign.bushing, tests),
         *temperature_warning(model, tests),
         *data.assumptions,
-        *(
-            Caveat(
-                "unused_tie", f"the tie {tie.name} = {tie.expression} is not used: the model lacks {', '.join(lacking)}"
-            )
-            for tie in data.constraints.ties
-            if (lacking := [name for name in (tie.name, *tie.names) if name not in model.values])
-        ),
-        *(
-            Caveat("unused_prior", f"the prior {prior.source} is not used: the model lacks {', '.join(prior.names)}")
-            for prior in data.constraints.priors
-            if model.values.keys().isdisjoint(prior.names)
-        ),
-        *outlier_warnings(outliers, robust=data.robust),
-        *result.warnings,
-    )
-    return replace(result, warnings=warnings, outliers=outliers, specimens=data.campaign.specimens)
+    ]
+    for tie in data.constraints.ties:
+        if lacking := ", ".join(name for name in (tie.name, *tie.names) if name not in model.values):
+            sentence = f"the tie {tie.name} = {tie.expression} is not used: the model lacks {lacking}"
+            warnings.append(Caveat("unused_tie", sentence))
+    for prior in data.constraints.priors:
+        if model.values.keys().isdisjoint(prior.names):
+            sentence = f"the prior {prior.source} is not used: the model lacks {', '.join(prior.names)}"
+            warnings.append(Caveat("unused_prior", sentence))
+    warnings += outlier_warnings(outliers, robust=data.robust)
+    result = build_result(steps, data.bounds, fixed=fixed, notes=warnings, unused=unused)
+    advised = (replace(note, text=note.text + NEXT) if note.kind in _ADVISED else note for note in result.warnings)
+    return replace(result, warnings=tuple(advised), outliers=outliers, specimens=data.campaign.specimens)
 
 
 def build_result(
@@ -300,7 +297,6 @@ def build_result(
     notes: Sequence[Caveat] = (),
     unused: Sequence[MeasuredTest] = (),
     bounded_is_fixed: bool = False,
-    advice: str = "",
 ) -> Result:
     """Build a result: the model of the last fit, with the uncertainty and the warnings of all fits.
 
@@ -312,7 +308,6 @@ def build_result(
         notes: warnings to report before those of the fits.
         unused: tests that no fit used, to compare the model with.
         bounded_is_fixed: True to treat a parameter at a bound as fixed even if the model meets the tests.
-        advice: text to append to the sentence on a misfit.
 
     Returns:
         The model with covariance, quality, measured range, misfit of each test, and warnings.
@@ -331,7 +326,7 @@ def build_result(
         for name, end in step.at_bound.items():
             if bounds.get(name, (None, None))[end == "max"] is None:
                 limits[name] = find_limit(limited, name, "max" if end == "min" else "min")
-        warnings += fit_warnings(last.model, step, limits, cov, advice)
+        warnings += fit_warnings(last.model, step, limits, cov)
     return Result(
         model,
         tuple(name for name in names if not (bounded_is_fixed and name in at_bound)),
@@ -348,7 +343,7 @@ def build_result(
 
 
 def fit_warnings(
-    model: Model, step: FitResult, limits: Mapping[str, float | None], covariance: Covariance, advice: str = ""
+    model: Model, step: FitResult, limits: Mapping[str, float | None], covariance: Covariance
 ) -> list[Caveat]:
     """Warnings about the tests of a fit, parameters at bounds, parameters not determined, and a misfit.
 
@@ -358,7 +353,6 @@ def fit_warnings(
         limits: one-sided 95 % limits [SI] of the parameters that ended at a bound of the model, not of the campaign, by
             name; None for a parameter that the tests do not limit.
         covariance: covariance of the fitted parameters.
-        advice: text to append to the sentence on a misfit.
 
     Returns:
         Warnings.
@@ -393,4 +387,4 @@ def fit_warnings(
         warnings.append(Caveat("parameter_limit", f"{name} ended at a limit of the model: {shown}"))
     judged = [name for name in names if name not in at_bound and effect_name_of(name) != PRELOAD]
     warnings += undetermined_parameters(model, step.problem.tests, judged, covariance)
-    return warnings if step.smooth_error else [*warnings, *misfit_warnings(model, tests, len(names), advice)]
+    return warnings if step.smooth_error else [*warnings, *misfit_warnings(model, tests, len(names))]
