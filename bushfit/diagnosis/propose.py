@@ -167,7 +167,7 @@ def _replacement(fit: FitResult, effect: Effect, fixed: Sequence[str]) -> tuple[
         with suppress(FitError, ModelError):  # no response from there
             with_effect = fit.model.with_effect(effect.name, start)
             descent = Descent.start(FitProblem.with_fixed(with_effect, fit.data_sets, fixed, {}))
-            ends.append((descent.chi_square - descent.expected_fall, descent.model))
+            ends.append((descent.chi_square - descent.expected_fall, descent.best.model))
     if not ends:
         return None
     chi_square, model = min(ends, key=lambda end: end[0])

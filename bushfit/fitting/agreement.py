@@ -35,6 +35,8 @@ _ENOUGH = 0.5
 _FEWEST_FITTED = 5
 #: Share of the information that comes from a prior, above which tests cannot contradict it.
 _ALL = 0.99
+#: Constant quantity of a test that is not a run at a constant amplitude or frequency.
+_NO_RUN: dict[str, Any] = {"held": None, "value": None, "unit": None}
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,16 +156,14 @@ def misfits(model: Model, fitted: Sequence[MeasuredTest], unfitted: Sequence[Mea
         relative, gain = test.relative(model), 1.0 - np.abs(test.noise_free(model).measured / test.measured)
         squares = np.square(test.residual(model)).reshape(test.residuals_per_point, -1).sum(axis=0)
         runs = list(_runs(test))
-        for label, points in ((dict[str, Any](), slice(None)), *(runs if len(runs) > 1 else ())):
+        for label, points in ((_NO_RUN, slice(None)), *(runs if len(runs) > 1 else ())):
             of_run = relative[points]
             counted = test.residual_count * of_run.size / relative.size * test.test.weight
             misfit = Misfit(
                 test=test.name,
                 place=str(test.direction),
                 fitted=index < len(fitted),
-                held=label.get("held"),
-                value=label.get("value"),
-                unit=label.get("unit"),
+                **label,
                 points=of_run.size,
                 nrmse=float(np.sqrt(np.mean(of_run**2))),
                 reduced_chi_square=float(squares[points].sum()) / counted,
@@ -305,7 +305,7 @@ def _runs(test: MeasuredTest) -> Iterator[tuple[dict[str, Any], Array]]:
         dict.
     """
     if not isinstance(test, MeasuredSweep) or test.test.stepped is None:
-        yield {}, np.ones(test.frequency.size, dtype=bool)
+        yield _NO_RUN, np.ones(test.frequency.size, dtype=bool)
         return
     quantity = "amplitude" if test.test.stepped == "frequency" else "frequency"
     unit = test.direction.motion.displacement_unit if quantity == "amplitude" else "Hz"

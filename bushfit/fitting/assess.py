@@ -5,7 +5,7 @@ Warnings name tests that no rubber could produce, tests at different temperature
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Iterator, Sequence
 
 import numpy as np
 
@@ -200,28 +200,21 @@ def excess_chi_square(chi_square: float, freedom: int) -> float | None:
     return chi_square if chi_square > 1.0 + _LACK_OF_FIT * np.sqrt(2.0 / freedom) else None
 
 
-def misfit_warnings(model: Model, data_sets: Sequence[MeasuredTest], parameters: int) -> list[Caveat]:
-    """Warning that the model misses all tests together, or one test, by more than the noise.
+def misfit_warnings(model: Model, data_sets: Sequence[MeasuredTest], parameters: int) -> Iterator[Caveat]:
+    """Yield a warning if the model misses all tests together, or one test, by more than the noise.
 
     Args:
         model: fitted model.
         data_sets: tests.
         parameters: number of fitted parameters.
-
-    Returns:
-        List with the warning; empty if the model fits.
     """
     chi_square, freedom = reduced_chi_square(model, data_sets, parameters)
     by_test = {test.name: lack for test in data_sets if (lack := lack_of_fit(model, [test], 0)) is not None}
-    if excess_chi_square(chi_square, freedom) is None and not by_test:
-        return []
-    worst = max(by_test, key=lambda name: by_test[name], default="")
-    in_worst = f", {number(by_test[worst], 2)} in {worst}" if len(data_sets) > 1 and worst else ""
-    sentence = (
-        f"the model misses the data by more than their noise (reduced chi-square {number(chi_square, 2)}{in_worst}): "
-        f"intervals are invalid, though standard errors are scaled up"
-    )
-    return [Caveat("misfit", sentence)]
+    if by_test or excess_chi_square(chi_square, freedom) is not None:
+        worst = max(by_test, key=lambda name: by_test[name], default="")
+        in_worst = f", {number(by_test[worst], 2)} in {worst}" if len(data_sets) > 1 and worst else ""
+        missed = f"the model misses the data by more than their noise (reduced chi-square {number(chi_square, 2)}"
+        yield Caveat("misfit", f"{missed}{in_worst}): intervals are invalid, though standard errors are scaled up")
 
 
 def quality(model: Model, data_sets: Sequence[MeasuredTest], parameters: int) -> Quality:
@@ -334,16 +327,8 @@ def temperature_warning(model: Model, data_sets: Sequence[MeasuredTest]) -> list
     return [Caveat("temperatures_differ", sentence)]
 
 
-def mixed_condition_warnings(data_sets: Sequence[MeasuredTest]) -> list[Caveat]:
-    """Warnings about tests of one bushing made on several specimens or under several preloads.
-
-    Args:
-        data_sets: tests of a campaign.
-
-    Returns:
-        One warning for each condition that differs.
-    """
-    warnings = []
+def mixed_condition_warnings(data_sets: Sequence[MeasuredTest]) -> Iterator[Caveat]:
+    """Yield a warning if tests of one bushing were made on several specimens, and one if under several preloads."""
     labels = {"specimen_number": "of specimens", "preload": "under preloads of"}
     if preload_ranges(data_sets):  # a variable of the model, or without influence
         del labels["preload"]
@@ -356,21 +341,12 @@ def mixed_condition_warnings(data_sets: Sequence[MeasuredTest]) -> list[Caveat]:
         if len(by_value) > 1:
             listed = ", ".join(f"{value} ({name})" for value, name in by_value.items())
             sentence = f"the tests are {words} {listed}, and one model is fitted to all"
-            warnings.append(Caveat("mixed_conditions", f"{sentence}: fit each group in a separate campaign"))
-    return warnings
+            yield Caveat("mixed_conditions", f"{sentence}: fit each group in a separate campaign")
 
 
-def unfitted_warnings(model: Model, data_sets: Sequence[MeasuredTest]) -> list[Caveat]:
-    """Warnings about tests that a model was not fitted to and misses by more than their noise, one for each direction.
-
-    Args:
-        model: fitted model.
-        data_sets: tests that were not fitted.
-
-    Returns:
-        Warnings; empty if the model predicts all these tests within their noise.
-    """
-    misses, warnings = dict[str, list[tuple[float, float, str]]](), []
+def unfitted_warnings(model: Model, data_sets: Sequence[MeasuredTest]) -> Iterator[Caveat]:
+    """Yield a warning for each direction with tests, not fitted, that a model misses by more than their noise."""
+    misses = dict[str, list[tuple[float, float, str]]]()
     for test in data_sets:
         if (chi_square := lack_of_fit(model, [test], 0)) is not None:
             share = 100.0 * float(np.sqrt(np.mean(np.square(test.relative(model)))))
@@ -382,6 +358,4 @@ def unfitted_warnings(model: Model, data_sets: Sequence[MeasuredTest]) -> list[C
             smallest, largest = (number(end(share for _, share, _ in found), 2) for end in (min, max))
             missed = f"were not fitted, and the model misses them by {smallest} to {largest} % (NRMSE), {worst} by"
         subject = f"{worst}, {place}," if len(found) == 1 else f"{len(found)} tests, {place},"
-        sentence = f"{subject} {missed} {number(noises, 2)} times its noise"
-        warnings.append(Caveat("unfitted_test_missed", sentence))
-    return warnings
+        yield Caveat("unfitted_test_missed", f"{subject} {missed} {number(noises, 2)} times its noise")

@@ -22,7 +22,6 @@ from bushfit.effects.contract import Array
 from bushfit.errors import FitError, ModelError
 from bushfit.fitting.coordinates import ROUNDING
 from bushfit.fitting.problem import FitProblem, FitResult
-from bushfit.model.model import Model
 
 #: Damping of the first step, relative to the curvature: next to none, the starts are good (usual for such methods).
 _FIRST_DAMPING = 1e-3
@@ -55,11 +54,8 @@ class Descent:
     """State of a least-squares fit in progress, with the best model so far.
 
     Args:
-        problem: parameters to fit, tests and bounds.
-        model: best model so far.
+        best: best model so far, with its residuals and their derivatives.
         point: coordinates of its k fitted parameters, (k,).
-        residual: whitened residuals of the best model, (n,).
-        jacobian: derivatives of the residuals with respect to the coordinates, (k, n).
         tolerance: expected relative fall of chi-square below which the fit has converged; None for an absolute fall of
             0.01, which suffices to compare models.
         evaluations: number of model evaluations so far.
@@ -69,11 +65,8 @@ class Descent:
         last: last successful step, (k,), and the second derivative of the residuals along it, (n,); None before one.
     """
 
-    problem: FitProblem
-    model: Model
+    best: FitResult
     point: Array
-    residual: Array
-    jacobian: Array
     tolerance: float | None = None
     evaluations: int = 1
     converged: bool = False
@@ -105,12 +98,12 @@ class Descent:
                 found=", ".join(f"{name} = {value:.4g}" for name, value in model.values.items()),
                 hint="give start values or bounds in [fit] of the campaign",
             )
-        return cls(problem, model, point, misfit, slopes, tolerance, converged=not problem.names)
+        return cls(FitResult(problem, model, misfit, slopes), point, tolerance, converged=not problem.names)
 
     @property
     def chi_square(self) -> float:
         """Sum of the squared whitened residuals of the best model so far."""
-        return float(self.residual @ self.residual)
+        return self.best.chi_square
 
     @property
     def expected_fall(self) -> float:
@@ -120,9 +113,8 @@ class Descent:
     @property
     def solution(self) -> FitResult:
         """Result of the fit with the best model so far, converged or not."""
-        at_bound = self.problem.at_bound(self.point)
-        state = self.model, self.residual, self.jacobian, self.evaluations, at_bound, not self.converged
-        return FitResult(self.problem, *state)
+        at_bound = self.best.problem.at_bound(self.point)
+        return replace(self.best, evaluations=self.evaluations, at_bound=at_bound, stopped=not self.converged)
 
     def run(self, evaluations: int = EVALUATIONS) -> "Descent":
         """Take steps until the fit has converged or has used up its evaluations of the model.
@@ -135,7 +127,7 @@ class Descent:
         Returns:
             The fit after these steps.
         """
-        fit, problem = self, self.problem
+        fit, problem = self, self.best.problem
         while not fit.converged and fit.evaluations < evaluations:
             damping = fit.damping
             step, expected = fit._step(damping)
@@ -152,7 +144,7 @@ class Descent:
             fit = replace(fit, damping=damping * fit.growth, growth=growth)
             fit = replace(fit, evaluations=fit.evaluations + 1, converged=converged)
             try:
-                model = fit.model.with_values(problem.coordinates.values(point))
+                model = fit.best.model.with_values(problem.coordinates.values(point))
                 with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
                     # after a step that failed the residuals are computed alone first, and the last step is too short
                     # for the derivatives to change
@@ -165,32 +157,30 @@ class Descent:
                     if expected <= 0.0 or not fall > _LEAST_GAIN_RATIO * expected:
                         continue
                     if slopes is None:
-                        slopes = fit.jacobian if converged else problem.linearise(model)[1]
+                        slopes = fit.best.jacobian if converged else problem.linearise(model)[1]
             except ModelError:  # no response there
                 continue
             if np.all(np.isfinite(slopes)):
                 change = point - fit.point
                 fit = replace(
                     fit,
-                    model=model,
+                    best=FitResult(problem, model, reached, slopes),
                     point=point,
-                    residual=reached,
-                    jacobian=slopes,
                     damping=damping * max(_LEAST_DAMPING_RATIO, 1.0 - (2.0 * fall / expected - 1.0) ** 3),
                     growth=_FIRST_GROWTH,
-                    last=(change, change @ (slopes - fit.jacobian)),
+                    last=(change, change @ (slopes - fit.best.jacobian)),
                 )
         return fit
 
     @cached_property
     def _normal(self) -> tuple[Array, Array]:
         """Gauss-Newton Hessian, (k, k), and gradient, (k,), of chi-square/2 in the k parameter coordinates."""
-        return self.jacobian @ self.jacobian.T, self.jacobian @ self.residual
+        return self.best.jacobian @ self.best.jacobian.T, self.best.jacobian @ self.best.residual
 
     @cached_property
     def _reach(self) -> tuple[Array, Array]:
         """Smallest and largest coordinates after the next step, by the bounds and the limit of a step, (k,) each."""
-        parameters, (low, high) = self.problem.coordinates.parameters, self.problem.limits
+        parameters, (low, high) = self.best.coordinates.parameters, self.best.problem.limits
         longest = np.array([_LONGEST_STEP if parameter.log else np.inf for parameter in parameters])
         return np.maximum(low, self.point - longest), np.minimum(high, self.point + longest)
 
@@ -211,7 +201,7 @@ class Descent:
         size = np.diag(curvature)
         low, high = self._reach
         damped = curvature + np.diag(damping * size)
-        lowest, highest = self.problem.limits
+        lowest, highest = self.best.problem.limits
         outward = ((self.point <= lowest) & (slope >= 0.0)) | ((self.point >= highest) & (slope <= 0.0))
         free, step = (size > _LEAST_SENSITIVITY) & ~outward, np.zeros_like(slope)
         while free.any():
@@ -246,7 +236,7 @@ class Descent:
         if step @ (size * before) <= _SAME_WAY * lengths[0] * lengths[1]:
             return np.zeros_like(step)
         free, bend = (size > _LEAST_SENSITIVITY) & (step != 0.0), np.zeros_like(step)
-        pull = self.jacobian @ second * (lengths[0] / lengths[1]) ** 2
+        pull = self.best.jacobian @ second * (lengths[0] / lengths[1]) ** 2
         bend[free] = -0.5 * _solve(curvature + np.diag(damping * size), pull, free)
         return bend
 

@@ -54,8 +54,8 @@ class MeasuredSweep(MeasuredBase):
 
     Notes:
         Within a block of points with scatter s_i and a shared error t the covariance is V = diag(s_i^2) + t^2 1 1^T.
-        All runs of a line may also share an error, u^2 1 1^T over the line. A deviation is whitened by dividing it by s_i
-        and removing the error shared by its block; then the error shared by its line is removed in the same way. A
+        All runs of a line may also share an error, u^2 1 1^T over the line. A deviation is whitened by dividing it by
+        s_i and removing the error shared by its block; then the error shared by its line is removed in the same way. A
         point of weight w has s_i^2 = s^2/w; a point of weight 0 has no effect, not even on shared errors.
     """
 

@@ -139,7 +139,7 @@ def sweep_noise(sweeps: Sequence[Sweep], rig: RigSettings = UNSTATED) -> SweepNo
             exponent, reference = slopes[key[0]]
             lines[key] = replace(line, scatter=line.scatter / ((line.steps / reference) ** exponent)[:, None])
     repeated = [line for line in lines.values() if line.shared_freedom]
-    measured = repeated or [line for line in lines.values() if line.scatter_without_largest is not None]
+    measured = repeated or [line for line in lines.values() if line.squared_distances]
     variances, scatter_freedom = _pool_variances(lines, measured)
     stated_noise = {name: sweep.noise for name, sweep in by_name.items() if sweep.noise is not None}
     for name, sweep in by_name.items():
@@ -224,9 +224,8 @@ def _pool_variances(
     well_known = [line for line in measured if line.freedom >= _OWN_SCATTER]
     compared = sorted(well_known or measured, key=lambda line: -float(line.variance.sum()))
     for i, line in enumerate(compared):  # a single outlier may set a line apart
-        calmer = line.scatter_without_largest
-        if calmer is not None and calmer.size and _unequal(compared):
-            compared[i] = replace(line, scatter=calmer, freedom=len(calmer))
+        if line.without_largest and _unequal(compared):
+            compared[i] = line.without_largest
     equal = not _unequal(compared)
     few = [line for line in measured if well_known and line.freedom < _OWN_SCATTER]
     counted = [*compared, *few] if equal else measured

@@ -1,6 +1,6 @@
 """Fit procedures: static, dynamic, both in turn (the paper's two steps), and all parameters together."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -344,8 +344,8 @@ def build_result(
 
 def fit_warnings(
     model: Model, step: FitResult, limits: Mapping[str, float | None], covariance: Covariance
-) -> list[Caveat]:
-    """Warnings about the tests of a fit, parameters at bounds, parameters not determined, and a misfit.
+) -> Iterator[Caveat]:
+    """Yield warnings about the tests of a fit, parameters at bounds, parameters not determined, and a misfit.
 
     Args:
         model: fitted model.
@@ -353,38 +353,34 @@ def fit_warnings(
         limits: one-sided 95 % limits [SI] of the parameters that ended at a bound of the model, not of the campaign, by
             name; None for a parameter that the tests do not limit.
         covariance: covariance of the fitted parameters.
-
-    Returns:
-        Warnings.
     """
     tests, names, at_bound = step.data_sets, step.names, step.at_bound
-    notes = [note.about(test.name) for test in tests for note in test.notes]
+    if unknown := covariance.restricted(names).describe_unknown(model.values):
+        yield Caveat("parameter_unknown", unknown)
+    yield from (note.about(test.name) for test in tests for note in test.notes)
     if not names:
         found, missed = quality(model, tests, 0), lack_of_fit(model, tests, 0)
         kind, agreement = "given_values_meet", "meet the tests within their noise"
         if missed is not None:
             kind, agreement = "given_values_miss", f"miss the tests by {number(np.sqrt(missed), 2)} times their noise"
-        sentence = (
-            f"nothing was fitted, because every parameter is fixed; the given values {agreement} "
-            f"(NRMSE {number(100.0 * found.nrmse, 2)} %, reduced chi-square {number(found.reduced_chi_square, 3)})"
-        )
-        return [*notes, Caveat(kind, sentence)]
-    unknown = covariance.restricted(names).describe_unknown(model.values)
-    warnings = [*([Caveat("parameter_unknown", unknown)] if unknown else []), *notes]
+        figures = f"NRMSE {number(100.0 * found.nrmse, 2)} %, reduced chi-square {number(found.reduced_chi_square, 3)}"
+        fixed = f"nothing was fitted, because every parameter is fixed; the given values {agreement} ({figures})"
+        yield Caveat(kind, fixed)
+        return
     if step.stopped:
         sentence = f"the fit was stopped after {step.evaluations} evaluations of the model"
-        reason = "because chi-square hardly fell: some parameters are undetermined"
-        warnings.append(Caveat("fit_stopped", f"{sentence}, {reason}"))
+        yield Caveat("fit_stopped", f"{sentence}, because chi-square hardly fell: some parameters are undetermined")
     for name, end in at_bound.items():
         if name not in limits:
-            warnings.append(Caveat("given_bound", f"{name} is at the {end} given in [fit]"))
+            yield Caveat("given_bound", f"{name} is at the {end} given in [fit]")
             continue
         shown = "the data do not determine it"
         if (limit := limits[name]) is not None:
             unit, factor = display_unit(step.model.parameters[name].unit, 1.0, limit)
             how = f"at {'most' if end == 'min' else 'least'} {number(factor * limit, 2)} {unit}".rstrip(" -")
             shown = f"the tests only show that it is {how} (95 %)"
-        warnings.append(Caveat("parameter_limit", f"{name} ended at a limit of the model: {shown}"))
+        yield Caveat("parameter_limit", f"{name} ended at a limit of the model: {shown}")
     judged = [name for name in names if name not in at_bound and effect_name_of(name) != PRELOAD]
-    warnings += undetermined_parameters(model, step.problem.tests, judged, covariance)
-    return warnings if step.smooth_error else [*warnings, *misfit_warnings(model, tests, len(names))]
+    yield from undetermined_parameters(model, step.problem.tests, judged, covariance)
+    if not step.smooth_error:
+        yield from misfit_warnings(model, tests, len(names))

@@ -7,11 +7,10 @@ imaginary, both relative to |K|.
 
 from collections import defaultdict
 from collections.abc import Collection, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 
 import numpy as np
-from scipy.linalg import lapack, qr
 from scipy.special import chdtrc
 
 from bushfit.effects.contract import Array
@@ -48,7 +47,7 @@ class LineNoise:
         freedom: degrees of freedom of the sum of squares of `scatter`.
         shared: variances of the gain and phase errors shared by a run, estimated from each pair of repeats, (pairs, 2).
         shared_freedom: degrees of freedom of the mean of `shared`; 0 without repeats.
-        scatter_without_largest: `scatter` without its largest deviation, (k - 1, 2); None with repeats or few points.
+        without_largest: noise of the line without its largest deviation; None with repeats or few points.
         steps: frequency [Hz] or amplitude [m or rad] of each deviation, (k,); empty without repeats.
         squared_distances: squared distance of the point at each step from the smooth curve, in units of the robust
             scatter; empty with repeats.
@@ -58,7 +57,7 @@ class LineNoise:
     freedom: float
     shared: Array
     shared_freedom: float = 0.0
-    scatter_without_largest: Array | None = None
+    without_largest: "LineNoise | None" = None
     steps: Array = field(default_factory=lambda: np.empty(0))
     squared_distances: Mapping[float, float] = field(default_factory=dict)
 
@@ -151,16 +150,21 @@ def _about_smooth_curve(steps: Array, log_stiffness: Array) -> LineNoise:
     usual = np.median(np.sort(residual, axis=0)[degree + 1 :], axis=0)  # the curve goes through degree + 1 points
     inliers = np.all(residual <= np.maximum(_OUTLIER * MEDIAN_TO_SIGMA * usual, FLOOR), axis=1)
     inliers |= np.count_nonzero(inliers) < degree + 2  # too few would leave nothing free
-    scatter = _project_out(basis[inliers], values[inliers])
     curve = np.linalg.qr(basis)[0]
     misfit, free = values - curve @ (curve.T @ values), 1.0 - np.square(curve).sum(axis=1)
     falls = np.square(misfit).sum(axis=1) / np.maximum(free, FLOOR**2)
     worst = int(np.argmax(falls))  # the point without which the sum of squares about the curve falls most
-    calmer = _project_out(np.delete(basis, worst, axis=0), np.delete(values, worst, axis=0))
     squares = np.square(residual / np.maximum(MEDIAN_TO_SIGMA * usual, FLOOR)).sum(axis=1)
     squared = dict(zip(steps.tolist(), squares.tolist(), strict=True))
-    unshared = np.empty((0, 2))
-    return LineNoise(scatter, len(scatter), unshared, scatter_without_largest=calmer, squared_distances=squared)
+
+    def of_points(chosen: Array) -> LineNoise:
+        """Noise of the points of a mask, (n,), about the curve that is fitted to them by least squares."""
+        span = np.linalg.qr(basis[chosen])[0]
+        scatter = values[chosen] - span @ (span.T @ values[chosen])
+        return LineNoise(scatter, len(scatter) - degree - 1, np.empty((0, 2)))
+
+    calmer = of_points(np.arange(steps.size) != worst)
+    return replace(of_points(inliers), without_largest=calmer if calmer.freedom else None, squared_distances=squared)
 
 
 def disturbed_steps(lines: Iterable[LineNoise]) -> list[float]:
@@ -183,13 +187,6 @@ def disturbed_steps(lines: Iterable[LineNoise]) -> list[float]:
 def to_unit_interval(values: Array) -> Array:
     """Scale values, (n,), linearly to the interval from -1 to 1, for Legendre polynomials; all -1 if they are equal."""
     return 2.0 * (values - values.min()) / max(float(np.ptp(values)), np.finfo(float).tiny) - 1.0
-
-
-def _project_out(basis: Array, values: Array) -> Array:
-    """Independent residuals, (n - k, m), of values, (n, m), after a least-squares fit of k functions, (n, k)."""
-    (reflections, factors), _ = qr(basis, mode="raw")
-    turned, *_ = lapack.dormqr("L", "T", reflections, factors, values, lwork=values.shape[1])
-    return np.asarray(turned[basis.shape[1] :])
 
 
 def _gain_and_phase(values: Array) -> Array:

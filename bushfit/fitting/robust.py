@@ -7,7 +7,7 @@ Notes:
 """
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -104,19 +104,15 @@ def estimate(problem: FitProblem, *, robust: bool = False, lmfit: bool = False) 
     )
 
 
-def outlier_warnings(outliers: Sequence[Outlier], *, robust: bool) -> list[Caveat]:
-    """Warnings about the outliers that the fit includes and those that it leaves out, with the first rows of each test.
+def outlier_warnings(outliers: Sequence[Outlier], *, robust: bool) -> Iterator[Caveat]:
+    """Yield warnings about the outliers that the fit includes and those that it leaves out, with the first rows.
 
     Outliers of the displacement are always left out, see `prepared_loop`.
 
     Args:
         outliers: outliers of all tests.
         robust: True if the fit left the outliers out.
-
-    Returns:
-        At most two warnings.
     """
-    warnings = []
     for is_excluded, kind, decision in (
         (False, "outliers_included", " and the fit includes them: {}; --loss soft_l1 leaves them out"),
         (True, "outliers_excluded", ", left out of the fit: {}"),
@@ -130,5 +126,4 @@ def outlier_warnings(outliers: Sequence[Outlier], *, robust: bool) -> list[Cavea
             lists.append(f"{file} row{'s' if len(numbers) > 1 else ''} {', '.join(numbers[:_MOST_NAMED])}{more}")
         if count := sum(map(len, rows.values())):
             points = f"{count} point{'s lie' if count > 1 else ' lies'} farther from the model than noise explains"
-            warnings.append(Caveat(kind, points + decision.format("; ".join(lists))))
-    return warnings
+            yield Caveat(kind, points + decision.format("; ".join(lists)))

@@ -17,10 +17,6 @@ if TYPE_CHECKING:
     import lmfit
 
 
-class _OutOfBoundsError(Exception):
-    """Exception that ends a fit by lmfit when a step leaves the bounds."""
-
-
 def solve_with_lmfit(problem: FitProblem) -> FitResult:
     """Minimise the sum of squared residuals by MINPACK through lmfit, as the paper's static and dynamic fits do.
 
@@ -51,7 +47,7 @@ def solve_with_lmfit(problem: FitProblem) -> FitResult:
     def model_at(*point: float) -> Model:
         """Model at a point of the fit, given by the coordinates of its free parameters."""
         if not np.all((low <= point) & (point <= high)):
-            raise _OutOfBoundsError
+            raise ModelError("a step of the fit leaves the bounds")
         return problem.model.with_values(problem.coordinates.values(point))
 
     def model_of(parameters: lmfit.Parameters) -> Model:
@@ -59,7 +55,7 @@ def solve_with_lmfit(problem: FitProblem) -> FitResult:
         return model_at(*(parameter.value for parameter in parameters.values()))
 
     # a residual that is not finite is a ValueError of lmfit, which takes roots of a covariance nobody asked for
-    with suppress(_OutOfBoundsError, ModelError, ValueError), np.errstate(invalid="ignore", divide="ignore"):
+    with suppress(ModelError, ValueError), np.errstate(invalid="ignore", divide="ignore"):
         fit = lmfit.minimize(
             lambda parameters: problem.residual(model_of(parameters)),
             list(free.values()),  # which lmfit takes as they are, without a copy

@@ -247,7 +247,7 @@ def test_the_likelihood_is_averaged_over_the_process(refitted):
     solution, free = refitted.reevaluate(refitted.model, [sweep]), ["mu", "m"]
     cases, jacobian_rows = list[tuple[float, float]](), solution.jacobian
     for process in discrepancies(FittedTests(solution)):
-        units = process.tests.columns(process.complex_shapes)
+        units = process.columns
         eigenvalues, vectors = np.linalg.eigh(units.T @ units)
         for size in SIZES:
             variance = 1.0 + size**2 * eigenvalues
