@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from contextlib import suppress
-from functools import cache, lru_cache
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -38,10 +38,9 @@ def solve_with_lmfit(problem: FitProblem) -> FitResult:
         return Descent.start(problem).solution
     import lmfit
 
-    start, (low, high) = problem.start, problem.limits
-    free = _blank_parameters(start.size)
-    for parameter, value in zip(free.values(), start.tolist(), strict=True):
-        parameter.set(value=value)
+    low, high = problem.limits
+    free = lmfit.Parameters()
+    free.add_many(*((f"u{i}", value) for i, value in enumerate(problem.start.tolist())))
 
     @lru_cache(maxsize=2)  # tests know again the model they answered last: the best so far, and the one tried
     def model_at(*point: float) -> Model:
@@ -58,7 +57,7 @@ def solve_with_lmfit(problem: FitProblem) -> FitResult:
     with suppress(ModelError, ValueError), np.errstate(invalid="ignore", divide="ignore"):
         fit = lmfit.minimize(
             lambda parameters: problem.residual(model_of(parameters)),
-            list(free.values()),  # which lmfit takes as they are, without a copy
+            free,
             "leastsq",
             Dfun=lambda parameters: problem.linearise(model_of(parameters))[1],
             col_deriv=True,
@@ -73,13 +72,3 @@ def solve_with_lmfit(problem: FitProblem) -> FitResult:
             at_bound = problem.at_bound(problem.coordinates.point(best.values))
             return FitResult(problem, best, *problem.linearise(best), int(fit.nfev), at_bound)
     return Descent.start(problem, TOLERANCE).run().solution
-
-
-@cache
-def _blank_parameters(count: int) -> lmfit.Parameters:
-    """Unnamed lmfit parameters, reused by all fits with `count` parameters, because creating them takes long."""
-    import lmfit
-
-    parameters = lmfit.Parameters()
-    parameters.add_many(*((f"u{i}",) for i in range(count)))
-    return parameters

@@ -85,7 +85,7 @@ def test_it_ends_where_lmfit_ends(paper_model, data_sets, effects, bounds):
 
     known = lmfit.minimize(misfit, parameters, "least_squares", calc_covar=False, ftol=1e-12, xtol=1e-10)
     end = np.array([parameter.value for parameter in known.params.values()])
-    errors = np.sqrt(np.diag(np.linalg.pinv(found.jacobian @ found.jacobian.T)))
+    errors = np.sqrt(np.diag(np.linalg.pinv(found.best.jacobian @ found.best.jacobian.T)))
     assert found.converged
     assert found.chi_square == pytest.approx(known.chisqr, abs=1e-2)
     assert np.max(np.abs(found.point - end) / errors) < 0.05
