@@ -56,15 +56,16 @@ class ConditionColumn:
         """Convert a stated temperature or preload, such as "500 N", to the unit of the condition.
 
         Returns:
-            The value; NaN for a preload in another unit, None for a text that is no preload.
+            The value; 0 for no preload, NaN for a preload in another unit, None for a text that is no preload.
         """
         if self.unit == "degC":
             return parse_temperature(text) - CELSIUS
         turns = any(is_compatible(self.unit, si) for si in ("rad", "N*m"))
         if (preload := parse_preload(text, Direction.TORSION if turns else Direction.AXIAL)) is None:
             return None
-        is_same = is_compatible(self.unit, preload.unit)
-        return preload.value / si_factor(self.unit, preload.unit) if is_same else np.nan
+        if not preload.value:
+            return 0.0
+        return preload.value / si_factor(self.unit, preload.unit) if is_compatible(self.unit, preload.unit) else np.nan
 
     def is_near(self, value: float) -> NDArray[np.bool_]:
         """Mask of the rows, (n,), that belong to a stated temperature or preload, in the unit of the condition."""
@@ -149,6 +150,8 @@ class ConditionColumn:
             problem = f"too few rows are near the stated {name}"
             unit = "K" if self.unit == "degC" else self.unit
             expected = f"{_FEWEST_POINTS} rows or more within {self.tolerance:g} {unit} of {stated:.4g} {self.unit}"
+            if np.isnan(stated):
+                expected = f"a {name} in {self.unit}, as in the file"
             levels = self.groups(rows)
             nearest = min(levels, key=lambda level: abs(self.values[level].mean() - stated))
         raise self.table.error(

@@ -304,3 +304,16 @@ def test_inspect_gives_each_test_of_a_file_with_its_units(lab):
         *(f'preload = "{n} mm"' for n in ("-1.5", "0", "1.5")),
         *(f'temperature = "{n} degC"' for n in ("23.0", "40.0")),
     ]
+
+
+@pytest.mark.parametrize(
+    ("preload", "status", "problem"),
+    [("300 N", 2, "found: -1.5, 0, 1.5 mm expected: a preload in mm, as in the file"), ("none", 0, "front none")],
+)
+def test_a_stated_preload_is_one_of_those_in_the_file(lab, preload, status, problem):
+    folder, _ = lab(*FIT)
+    text = (folder / "mount.toml").read_text(encoding="utf-8").replace('"0 mm"', f'"{preload}"')
+    (folder / f"{preload}.toml").write_text(text, encoding="utf-8")
+    options = ("--direction", "front", "--no-plots", "-o", preload)
+    _, done = lab("fit", f"{preload}.toml", *options, status=status)
+    assert problem in " ".join(done.stderr.split())
