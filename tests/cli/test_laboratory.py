@@ -65,7 +65,7 @@ def numbers(text: str) -> list[float]:
 
 def line(done: Done, start: str) -> str:
     """The only line of the terminal that begins with these words."""
-    (found,) = [text.strip() for text in done.stderr.splitlines() if text.strip().startswith(start)]
+    (found,) = [text.strip() for text in done.text.splitlines() if text.strip().startswith(start)]
     return found
 
 
@@ -164,13 +164,13 @@ def test_predictions_meet_the_truth_within_their_bands(lab, name, options, condi
         assert (abs(table[column] - true) < 1.6 * wide).all(), column
         assert (wide < 0.1 * table[column]).all()
     ends = table[table["frequency [Hz]"].isin([table["frequency [Hz]"].min(), table["frequency [Hz]"].max()])]
-    rows = [found for text in done.stderr.splitlines() if len(found := numbers(text)) == 8 and "(" in text]
+    rows = [found for text in done.text.splitlines() if len(found := numbers(text)) == 8 and "(" in text]
     columns = [unit, f"{unit}, low", f"{unit}, high", *(f"loss factor [-]{end}" for end in ("", ", low", ", high"))]
     wanted = ends[["frequency [Hz]", amplitude, *columns]].to_numpy()
     assert np.array(rows) == pytest.approx(wanted, rel=0.006)
     if "preload" in conditions:
         assert (table["preload [mm]"] == 1e3 * conditions["preload"]).all()
-        assert f"{name} at a preload of {1e3 * conditions['preload']:g} mm: stiffness" in done.stderr
+        assert f"{name} at a preload of {1e3 * conditions['preload']:g} mm: stiffness" in done.text
 
 
 def test_a_measured_record_is_met_by_respond_and_validation(lab):
@@ -199,7 +199,7 @@ def test_a_measured_record_is_met_by_respond_and_validation(lab):
     assert row["points in band [%]"] == pytest.approx(100.0 * band.mean(), abs=3.0)
     names = ("NRMSE [%]", "peak gap [%]", "energy gap [%]", "points in band [%]")
     assert numbers(line(done, "record_front axial  "))[-4:] == pytest.approx([row[name] for name in names], rel=0.01)
-    assert "mount 7: consistent" in done.stderr
+    assert "mount 7: consistent" in done.text
     model = json.loads((folder / "run/model.json").read_text(encoding="utf-8"))["parameters"]
     page = parsed((folder / "run/report.html").read_text(encoding="utf-8")).text
     assert f"{1e-6 * model['mu']['value']:.4f}" in page
@@ -270,7 +270,7 @@ def test_the_batch_and_the_exported_tables_have_the_numbers_of_the_single_comman
     assert row[f"loss factor {name} [-]"] == pytest.approx(point["loss factor [-]"], rel=1e-5)
     coupon = truth("DMA", [10.0], [0.01])[0]
     assert row["stiffness DMA 10 Hz 1 % [MPa]"] == pytest.approx(1e-6 * abs(coupon), rel=0.005)
-    said = " ".join(done.stderr.split())
+    said = " ".join(done.text.split())
     assert f"mount fails: loss factor {name} {point['loss factor [-]']:.4g}" in said
     assert "1 fail" in said
 
@@ -294,12 +294,12 @@ def test_a_resonance_test_is_reduced_to_the_stiffness_of_the_specimen(lab):
 def test_inspect_gives_each_test_of_a_file_with_its_units(lab):
     files = ("front.csv", "rear.csv", "loop_front.csv", "sim/loop_rear left axial_2.csv")
     _, done = lab("inspect", *files, "--no-plots", "-o", "seen")
-    text = " ".join(done.stderr.split())
+    text = " ".join(done.text.split())
     assert text.count('amplitudes: 0.1, 0.4 mm zero-to-peak, half of "Displacement p-p [mil]"') == 3
     assert text.count("amplitudes: 0.05, 0.2 mm zero-to-peak") == 2
     assert "programme: 2 loops in one record: 0.3, 0.9 mm at 0.2 Hz" in text
     assert "frequency: 0.1 Hz, a sine" in text
-    keys = re.findall(r'(?:preload|temperature) = "[^"]*"', done.stdout)
+    keys = re.findall(r'(?:preload|temperature) = "[^"]*"', done.text)
     assert keys == [
         *(f'preload = "{n} mm"' for n in ("-1.5", "0", "1.5")),
         *(f'temperature = "{n} degC"' for n in ("23.0", "40.0")),
@@ -316,4 +316,4 @@ def test_a_stated_preload_is_one_of_those_in_the_file(lab, preload, status, prob
     (folder / f"{preload}.toml").write_text(text, encoding="utf-8")
     options = ("--direction", "front", "--no-plots", "-o", preload)
     _, done = lab("fit", f"{preload}.toml", *options, status=status)
-    assert problem in " ".join(done.stderr.split())
+    assert problem in " ".join(done.text.split())
