@@ -39,7 +39,7 @@ _POINT_COLUMNS = {"": 0, ", low": 1, ", high": 2}
 #: Name of the measured curve among the compared quantities.
 _CURVE = "measured stiffness"
 #: Kinds of warnings on a misfit whose cause a diagnosis may find, and on points outside the tested range.
-_MISFITS = {"misfit", "model_error", "levels_disagree", "unfitted_test_missed"}
+_MISFITS = {"misfit", "model_error", "unfitted_test_missed"}
 _EXTRAPOLATIONS = {"extrapolated_frequency", "extrapolated_strain", "extrapolated_rate", "extrapolated_stroke"}
 #: Maximum number of names in a sentence.
 _NAMES_LISTED = 10
@@ -308,7 +308,7 @@ class BatchResult:
             if not (part.poor_fit or record.verdict or _MISFITS.isdisjoint(part.warning_kinds))
         ]
         if missing:
-            sentence = f"the model misses the tests of {listed(missing)} by more than their noise"
+            sentence = f"the tests of {listed(missing)} deviate from the model by more than noise and 1 %"
             warnings.append(Caveat("part_misfit", f"{sentence}: --command diagnose looks for the cause"))
         if lacking := [part.name for part, lacks in zip(parts, self.lacks_sweep, strict=True) if lacks]:
             sentence = f"no sweep, unlike the other parts, and so not compared with them: {listed(lacking)}"

@@ -101,7 +101,7 @@ def _print_comparison(output: Output, name: str, compared: ComparisonOutput) -> 
             if names := comparison.differing:
                 different.append(f"{label} differs from {first} in {', '.join(names)}")
         verdict = f"{'; '.join(different)}: more than chance explains"
-        action = "use each result for its part only; differences.csv lists stiffness and loss factor at each point"
+        action = "do not exchange the results; differences.csv lists stiffness and loss factor at each point"
         if not different:
             verdict = f"no stiffness, loss factor or parameter differs from that of {first} by more than chance"
             action = "the compounds agree within the intervals below"

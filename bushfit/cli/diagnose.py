@@ -11,9 +11,8 @@ from rich.markup import escape
 
 from bushfit.cli.options import command_called, file_option, option, option_group
 from bushfit.cli.output import Output, with_output
-from bushfit.cli.printing import print_parameters, print_validations
+from bushfit.cli.printing import print_parameters, print_tests, print_validations
 from bushfit.cli.shared_options import campaign_options, exit_above, open_campaign, quantity
-from bushfit.units import number
 
 if TYPE_CHECKING:
     from bushfit.commands.diagnose import DiagnosisOutput
@@ -85,6 +84,7 @@ def print_diagnosis(output: Output, diagnosed: DiagnosisOutput) -> None:
     print_validations(output, diagnosed.validations, diagnosed.validations_before)
     for effect in diagnosed.document["effects"] if diagnosis.verdict != "ambiguous" else ():
         output.console.print(f"  [bold]why {effect['name']}:[/bold] {escape(effect['evidence'])}")
+    print_tests(output, (), diagnosis.result.usable)
     if output.verbose:
         title = "candidates: reduction of chi-square (gain) and probability that the effect is missing in the model"
         fitted = ((candidate, candidate.gain) for candidate in diagnosis.candidates if candidate.gain is not None)
@@ -92,15 +92,13 @@ def print_diagnosis(output: Output, diagnosed: DiagnosisOutput) -> None:
         output.print_table(title, ("candidate", "why", "gain", "probability"), rows, text_columns=2)
     has_more = tuple(diagnosis.result.model.effects) != BASE
     if has_more or output.verbose:
-        title = "model with the added effects" if has_more else "model"
-        print_parameters(output, title, diagnosis.result)
+        print_parameters(output, "fitted model", diagnosis.result)
     output.warn(diagnosis.warnings)
 
 
 def print_verdict(output: Output, diagnosed: DiagnosisOutput, action: str = "") -> None:
     """Print the verdict of a diagnosis, the next step (`action`), a summary, and probabilities of missing effects."""
     from bushfit.diagnosis.record import format_odds
-    from bushfit.effects.unnamed import NAME as UNNAMED
 
     colour = _COLOURS.get(diagnosed.headline, "yellow")
     output.print_headline(diagnosed.data.campaign.name, diagnosed.headline, action, f"bold {colour}")
@@ -109,9 +107,7 @@ def print_verdict(output: Output, diagnosed: DiagnosisOutput, action: str = "") 
     if diagnosed.adopt:
         output.print(f"  {diagnosed.adopt}")
     if diagnosed.diagnosis.verdict == "ambiguous" and diagnosed.diagnosis.added:
-        before, after = diagnosed.diagnosis.before.model.effects, diagnosed.result.model.effects
-        added = ("a smooth correction" if name == UNNAMED else name for name in after if name not in before)
-        output.print(f"  if not, use model.json: it adds {' and '.join(added)}, and its bands include all explanations")
+        output.print("  otherwise use model.json, whose bands include all explanations")
 
 
 def print_findings(output: Output, diagnosed: DiagnosisOutput) -> None:
@@ -130,28 +126,26 @@ def print_findings(output: Output, diagnosed: DiagnosisOutput) -> None:
 
 
 def _print_gap(output: Output, document: Mapping[str, Any], changed: bool) -> None:
-    """Print the gap (misfit in units of noise), for held-out and fitted data, and the expected error of the model.
+    """Print the gap (misfit in units of noise) for held-out and fitted data.
 
     Args:
         output: where to print.
         document: content of diagnosis.json.
         changed: True if the diagnosis changed the model or the record.
     """
-    gap, usable, console = document["gap"], document["usable"], output.console
+    gap = document["gap"]
     held_out = gap["heldout"]
     cells = [f"{held_out[when]:.2f}" for when in ("before", "after")] if held_out else ["not testable", ""]
     rows = (("held out", *cells), ("data fitted", *(f"{value:.2f}" for value in gap["calibration"].values())))
     title = "gap (measured minus model) in units of the noise; 1: noise alone"
     if document["verdict"] != "consistent" and not changed:
-        title += "; nothing was added, and all tests were fitted"
+        title += "; the diagnosis added nothing, and all tests were fitted"
+    elif any(effect["correction"] for effect in document["effects"]):
+        title += "; after: with the corrected record"
     output.print_table(title, ("", "before", "after"), rows)
-    if usable:
-        how = "of the points, each predicted by a fit without it" if usable["held_out"] else "of the fitted points"
-        error = f"{number(100 * usable['stiffness'], 2)} % in stiffness and {number(usable['loss_factor'], 2)}"
-        console.print(f"  expected error {error} in loss factor (95 % {how})")
     if output.verbose:
         for part in gap["skipped"]:
-            console.print(f"  not held out: {part['part']}; {part['reason']}")
+            output.console.print(f"  not held out: {part['part']}; {part['reason']}")
 
 
 def _print_effect(output: Output, effect: EffectEntry) -> None:
@@ -165,10 +159,6 @@ def _print_effect(output: Output, effect: EffectEntry) -> None:
     for parameter, value, interval in effect_sizes(effect):
         console.print(f"    {parameter} = {value}, {f'95 % {interval}' if interval else 'no interval'}")
     if effect["twins"]:
-        names = f"{effect['name']} from {' or '.join(effect['twins'])}"
-        if effect["alternatives"]:
-            console.print(f"    the tests cannot distinguish {names}")
-        else:
-            console.print(f"    the tests determine the size of the effect but cannot distinguish {names}")
+        console.print(f"    the tests cannot distinguish {effect['name']} from {' or '.join(effect['twins'])}")
     if effect["correction"]:
         console.print(f"    correction in the campaign: {escape(effect['correction'])}")

@@ -168,8 +168,9 @@ def _print_static(output: Output, curve: StaticCurve) -> None:
 
 def print_predictions(output: Output, predicted: PredictionOutput) -> None:
     """Print the rows of each prediction table at the lowest and highest frequency, and collect its warnings."""
+    from bushfit.effects.temperature import REFERENCE
     from bushfit.report.tables import prediction_table, spread_indices
-    from bushfit.units import format_aligned, number
+    from bushfit.units import CELSIUS, format_aligned, number
 
     for prediction in predicted.predictions:
         table = prediction_table(prediction)
@@ -185,6 +186,8 @@ def print_predictions(output: Output, predicted: PredictionOutput) -> None:
                 value, *limits = format_aligned([row[name], *band], digits)
                 cells.append(f"{value} ({' to '.join(limits)})" if band[0] < band[1] else value)
             rows.append(cells)
-        title = f"{owner}{prediction.label}, first and last frequency, with 95 % bands"
+        temperature = (prediction.temperature or REFERENCE) - CELSIUS
+        condition = f" at {number(temperature, 3)} degC" if "temperature" in predicted.result.model.depends_on else ""
+        title = f"{owner}{prediction.label}{condition}, first and last frequency, with 95 % bands"
         output.print_table(title, list(table.columns[:4]), rows, text_columns=0)
     output.warn(predicted.warnings)

@@ -16,7 +16,7 @@ from bushfit.cli.file_options import direction_error, metadata_options, options_
 from bushfit.cli.options import command_called, option, option_group
 from bushfit.cli.output import Output, with_output
 from bushfit.cli.shared_options import grid, quantity
-from bushfit.errors import BushfitError, MeasurementError, error_location
+from bushfit.errors import BushfitError, MeasurementError, error_location, quote_path
 from bushfit.report import plots
 from bushfit.report.results import ResultFile
 from bushfit.units import format_aligned, number
@@ -108,7 +108,7 @@ def command(files: tuple[Path, ...], levels: str | None, cycles: int, output: Ou
     }
     results = [ResultFile("sweep", "table", points), ResultFile("reduce", "figure", figure)]
     output.write(folder, results, document, files)
-    output.print(f"for a campaign in {folder} (in another folder, add the path):\n\n{snippet}")
+    output.print(f"next: bushfit init {quote_path(folder / file)}, or write into a campaign in {folder}:\n\n{snippet}")
 
 
 def _resonance_table(file: Path, test_options: Mapping[str, Any], shaker: Mapping[str, Any]) -> Table | None:

@@ -33,12 +33,14 @@ def probability_text(composition: Composition, finding: Finding) -> str:
 
 def undecided_text(reported: Sequence[Composition]) -> str:
     """Sentence that lists explanations that the tests cannot distinguish, and the parts that all of them contain."""
-    parts = [composition.label.split(" + ") for composition in reported]
+    parts = [composition.label.replace("fault: ", "a fault of ").split(" + ") for composition in reported]
     shared = [name for name in parts[0] if all(name in names for names in parts)]
-    *labels, last = (" + ".join(name for name in names if name not in shared) or "nothing else" for names in parts)
-    rivals = f"{', '.join(labels)} and {last}".replace("fault: ", "a fault of ")
-    sentence = f"these tests cannot distinguish between {rivals}"
-    return f"{sentence}; all probable explanations also contain {' and '.join(shared)}" if shared else sentence
+    common = f"all probable explanations contain {' and '.join(shared)}"
+    rests = [" + ".join(name for name in names if name not in shared) for names in parts]
+    if "" in rests:
+        return f"{common}; a further cause is possible: {' or '.join(filter(None, rests))}"
+    sentence = f"these tests cannot distinguish between {', '.join(rests[:-1])} and {rests[-1]}"
+    return f"{sentence}; {common}" if shared else sentence
 
 
 def causes_text(candidates: Sequence[Composition], finding: Finding) -> list[str]:
@@ -77,7 +79,8 @@ def explanation_odds(finding: Finding) -> Odds:
     for composition in compositions:
         claim = composition.best.claim
         parts = [claim.sentence] if claim else []
-        parts += [f"{get_effect(name).phrase} ({name})" for name in composition.names]
+        effects = [get_effect(name) for name in composition.names]
+        parts += [f"{effect.phrase} ({' or '.join((effect.name, *effect.twins))})" for effect in effects]
         parts += [f"a faulty test: {part.name}" for part in composition.faulty_parts]
         *parts, last = (*parts, *composition.nameless)
         sentences.append(", and ".join(filter(None, (", ".join(parts), last))))

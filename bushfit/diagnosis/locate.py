@@ -165,6 +165,9 @@ def _describe_sweep_misfit(
         spans: lowest and highest frequency [Hz], and amplitude [m or rad], of the region.
     """
     quantity = "stiffness" if part == "storage" else "loss"
+    labels = [line.label for line in lines]
+    if len({*labels}) < len(labels):  # sweeps at several temperatures
+        labels = [line.name for line in lines]
     worst = max(touched, key=lambda i: float(np.abs(pieces[i]).max()))
     largest = max(pieces[worst].tolist(), key=abs)
     sides = ("above", "below") if largest > 0 else ("below", "above")
@@ -173,7 +176,7 @@ def _describe_sweep_misfit(
     across = [i for i, piece in enumerate(pieces) if np.max(-np.sign(largest) * piece) > _STRONG * abs(largest)]
     agreeing = [i for i in touched if i == worst or i not in across]
     is_everywhere = len(agreeing) == len(lines)
-    levels = f"every {fixed_axis}" if is_everywhere else ", ".join(lines[i].label for i in agreeing)
+    levels = f"every {fixed_axis}" if is_everywhere else ", ".join(dict.fromkeys(labels[i] for i in agreeing))
     unit, factor = ("Hz", 1.0) if line.stepped != "amplitude" else line.direction.display.displacement
     low, high = (factor * end for end in spans[line.stepped == "amplitude"])
     sentences = [
@@ -182,7 +185,7 @@ def _describe_sweep_misfit(
     ]
     means = [float(np.mean(piece)) for piece in pieces]
     if across:
-        sentences.append(f"It is {sides[1]} the model at {', '.join(lines[i].label for i in across)}")
+        sentences.append(f"It is {sides[1]} the model at {', '.join(dict.fromkeys(labels[i] for i in across))}")
     elif is_everywhere and len(means) > 1 and np.ptp(means) >= _CHANGES * max(abs(mean) for mean in means):
         sentences.append(f"The gap {_trend_verb(means[0], means[-1])} with {fixed_axis}")
     trend = _trend(line.stepped or "frequency", line.step, pieces[worst])
@@ -237,6 +240,7 @@ def _loop_regions(fit: FitResult) -> Iterator[MisfitRegion]:
         unit, factor = data_set.direction.display.displacement
         frequency = float(data_set.frequency[0])
         loop = f"the {data_set.direction} loop of {amplitude * factor:.3g} {unit} at {frequency:.3g} Hz"
+        loop += f" ({data_set.name})" if len(loops) > 1 else ""
         yield MisfitRegion(
             data_set.direction,
             "loop",

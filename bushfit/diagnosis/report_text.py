@@ -217,7 +217,7 @@ class DiagnosisWriter:
         best, claim, base = first.best, first.best.claim, self._with_free_gains(self.search.base)
         assert claim is not None
         command, corrections = f"bushfit diagnose CAMPAIGN {claim.options}", "; ".join(claim.corrections)
-        advice = f"if the records of the tests confirm this mistake, state {corrections} (or {command})"
+        advice = f"if the records of the tests confirm this mistake, correct {corrections} (or {command})"
         summary = f"these tests agree if {claim.sentence}"
         if self.finding.verdict == "ambiguous":
             summary += "; correct this first: the tests do not decide yet what else is missing"

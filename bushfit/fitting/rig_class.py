@@ -27,7 +27,8 @@ def largest_error(rig: RigSettings) -> tuple[float, float]:
 
 def format_class_errors(error: tuple[float, float]) -> str:
     """Format a relative gain error and a phase error [rad] as text, such as "0.5 % gain and 0.25 deg phase"."""
-    return f"{100.0 * error[0]:.2g} % gain and {np.degrees(error[1]):.2g} deg phase"
+    texts = f"{100.0 * error[0]:.2g} % gain", f"{np.degrees(error[1]):.2g} deg phase"
+    return " and ".join(text for text, size in zip(texts, error, strict=True) if size or not any(error))
 
 
 def describe_class(rig: RigSettings) -> str:

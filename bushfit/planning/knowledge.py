@@ -13,7 +13,7 @@ from bushfit.diagnosis.fits import fit_model, fit_rivals, result_of
 from bushfit.diagnosis.propose import proposals
 from bushfit.diagnosis.record import Diagnosis
 from bushfit.diagnosis.workflow import diagnose
-from bushfit.effects import LIBRARY, get_effect, twins_of
+from bushfit.effects import LIBRARY, get_effect, place_suffix, twins_of
 from bushfit.errors import ModelError, did_you_mean
 from bushfit.fitting.coordinates import Bounds, Coordinates, relative_sizes
 from bushfit.fitting.preparation import MeasuredTest, split_by_kind
@@ -66,7 +66,7 @@ def from_campaign(data: PreparedCampaign, rivals: Sequence[str] | None = None) -
         FitError: the data cannot support the fit.
         ModelError: these tests could not show a given effect, or the diagnosis finds no rivals.
     """
-    _check_rivals(rivals or (), LIBRARY)
+    _check_rivals([name for name in rivals or () if not place_suffix(name)], LIBRARY)
     diagnosis = None if rivals is None else diagnose(data)
     noise = estimate_noise(data)
     data = PreparedCampaign.from_campaign(replace(data.campaign, rig=with_rig_class(data.campaign.rig, noise)))

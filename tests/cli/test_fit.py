@@ -286,3 +286,4 @@ def test_what_gives_way_in_one_direction_or_in_all_is_a_set_where_it_is_equal(
     assert ("sleeve_compliance" in added) == (found["verdict"] == "named")
     if leader["alternatives"]:
         assert re.search(rf"bushfit plan tests/campaign.toml --rivals {','.join(named)} ", found["next_test"])
+        typed("plan", "tests/campaign.toml", "--rivals", ",".join(named), "--hours", "1", "-o", "plan")

@@ -144,8 +144,8 @@ def off_by_waves(rig) -> tuple[Campaign, Result]:
 
 def test_a_model_error_is_told_and_kept_in_the_file(off_by_waves):
     result = off_by_waves[1]
-    (line,) = [line for line in map(str, result.warnings) if "the model misses the tests by " in line]
-    assert "parameters are the closest fit, and their intervals include this misfit" in line
+    (line,) = [line for line in map(str, result.warnings) if "the tests deviate from the model by " in line]
+    assert "parameters are the closest fit, and their intervals include this deviation" in line
     assert "bushfit diagnose" in line
     again = from_document(to_document(result), Path("model.json"))
     assert again.model_error == result.model_error

@@ -126,7 +126,7 @@ def column_titles(table: pd.DataFrame, result: Result, diagnosis: Mapping[str, A
         added = ["a smooth correction" if name == UNNAMED else name for name in result.model.effects if name in found]
         names["after"] = f"after adding {' and '.join(added)}" if added else names["after"]
     gaps = diagnosis["gap"]["calibration"]
-    tails = {side: f"\ndata fitted {gaps[side]:.2f} × noise" for side in names if gaps[side] is not None}
+    tails = {side: f"\nfitted {gaps[side]:.2f} × noise" for side in names if gaps[side] is not None}
     return {side: name + tails.get(side, "") for side, name in names.items()}
 
 
