@@ -66,6 +66,10 @@ _EVERYDAY: dict[str, tuple[float, str]] = {
 }
 #: The letters of one unit.
 _WORD = re.compile(r"[^\W\d_]+|[º˚]")
+#: Unit of mass that stands for the weight of this mass in a force or stiffness: kg, lbs.
+_MASS = re.compile(r"(?<![^\W_])(kg|lb)s?(?![^\W\d_])")
+#: Newton before a length with a power: the N of Nmm-1.
+_NEWTON = re.compile(r"(?<![^\W_])(k?N)(?=(?:mm|cm|m)(?:\^|\*\*)?-)")
 #: Position between a unit and a power without a sign: mm2, mm-1.
 _POWER = re.compile(r"(?<=[^\W\d_])(?=(?:[23]|-[123])(?!\d))")
 #: A point or hyphen as the sign of a product: N.m, N-m.
@@ -93,7 +97,7 @@ def si_factor(text: str, expected: str) -> float:
 
     Args:
         text: unit such as "kN" or "N/mm"; "-" and "" mean a ratio.
-        expected: SI unit of the same dimension.
+        expected: SI unit of the same dimension. A unit of mass is also a unit of force, and N_mm also N/mm.
 
     Returns:
         SI value of one unit.
@@ -105,12 +109,14 @@ def si_factor(text: str, expected: str) -> float:
         return degree[0]
     text = {"m/s^2": _OF_ACCELERATION, "m": _OF_LENGTH}.get(expected, {}).get(text.strip(), text)
     scale, base = _resolve(text)
-    if base != _resolve(expected)[1]:
-        words = set(_WORD.findall(text))
-        hint = 'a pound of force is "lbf"' if {"lb", "lbs"} & words else None
-        hint = 'a kilogram of force is "kgf"' if {"kg", "g"} & words and "N" in expected else hint
+    expected_base = _resolve(expected)[1]
+    if base != expected_base and "_" in text:  # a name cannot contain a slash
+        scale, base = _resolve("/".join(text.rsplit("_", 1)))
+    if base != expected_base and "N" in expected:
+        scale, base = _resolve(_MASS.sub(r"\1f", text))
+    if base != expected_base:
         fitting = ", such as ".join(common_unit(expected))
-        raise UnitError("the unit does not fit", found=f'"{text}"', expected=fitting, hint=hint)
+        raise UnitError("the unit does not fit", found=f'"{text}"', expected=fitting)
     return scale
 
 
@@ -317,7 +323,7 @@ def _by_pint(text: str) -> tuple[float, str]:
     )
     if len(text) <= _LONGEST_UNIT:
         text = _WORD.sub(_spell, text)
-        text = _POWER.sub("^", _JOINT.sub("*", text))
+        text = _POWER.sub("^", _JOINT.sub("*", _NEWTON.sub(r"\1*", text.replace("_", " "))))
     if len(text) > _LONGEST_UNIT or not _UNIT.fullmatch(text):
         raise unknown
     for word in _WORD.findall(text):
@@ -344,7 +350,7 @@ def _registry() -> pint.UnitRegistry[Any]:
 
 def kelvin_scale(unit: str) -> tuple[float, float] | None:
     """Kelvin per unit, and kelvin at zero, of a temperature unit such as "°C"; None for other texts."""
-    return _TEMPERATURES.get(unit.replace("℃", "°C").replace("°", "deg").replace(" ", "").lower())
+    return _TEMPERATURES.get(unit.replace("℃", "°C").replace("°", "deg").replace(" ", "").replace("_", "").lower())
 
 
 def parse_temperature(raw: object) -> float:

@@ -34,7 +34,7 @@ from bushfit.units import CELSIUS, parse_quantity
 from bushfit.validation import validate_tables
 
 #: Endings of test files, from which `bushfit init` writes a campaign.
-TEST_FILES = (".csv", ".txt", ".tsv", ".dat", ".asc", ".xls", ".xlsx", ".xlsm", ".xlsb", ".ods", *RECORDINGS)
+TEST_FILES = (".csv", ".txt", ".tsv", ".dat", ".asc", ".lvm", ".xls", ".xlsx", ".xlsm", ".xlsb", ".ods", *RECORDINGS)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -17,6 +17,8 @@ from bushfit.reading.measurement import Loop
 from bushfit.reduction.arrays import MEDIAN_TO_SIGMA
 from bushfit.reduction.harmonics import as_complex, basis, least_squares, resolved_order, series, spread_rows
 
+#: Largest range of a mean cycle, relative to that of its record; chosen: the ends of a Fourier series overshoot less.
+_LARGEST_OVERSHOOT = 1.3
 #: Samples of one cycle where a series is drawn as a curve and the model answers; chosen: rows between two samples are
 #: interpolated linearly, which is then off by 5e-6 of the amplitude.
 GRID = 1024
@@ -227,6 +229,8 @@ def _fit_without_outliers(columns: Array, values: Array) -> tuple[Array, Array]:
         if np.array_equal(found, inliers) or np.count_nonzero(found) < 2 * solution.size:
             break
         inliers, solution = found, least_squares(columns, values, found)
+    if np.ptp(columns @ solution) > _LARGEST_OVERSHOOT * np.ptp(values):  # rows at rest, which are not stuck
+        return least_squares(columns, values), np.ones(values.size, dtype=bool)
     return solution, inliers
 
 

@@ -80,7 +80,8 @@ def keys_from_labels(
     written = "from the lines above the table" if table.layout.header_line else "from the properties in the file"
     sources = {"from the name": by_name, written: table.labels_above, "from the other sheets": of_book}
     in_text = (quantity for line in table.lines_above for quantity in labels_in_names(line.text).quantities)
-    counted = Labels(tuple(quantity for quantity in in_text if quantity.convention))  # "0.4 mm peak-to-peak"
+    is_amplitude = (quantity for quantity in in_text if quantity.convention or quantity.is_marked)
+    counted = Labels(tuple(one for one in is_amplitude if "Hz" not in one.unit))  # "amplitude 0.4 mm", "0.4 mm pk-pk"
     keys: dict[str, Any] = {}
     facts: dict[str, list[str]] = {}
     has_convention = True

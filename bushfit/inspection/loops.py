@@ -6,6 +6,7 @@ import numpy as np
 
 from bushfit.caveat import Caveat
 from bushfit.effects.mistakes import MISTAKES
+from bushfit.errors import MeasurementError
 from bushfit.fitting.loop_cycles import waveform
 from bushfit.fitting.measured_loop import MeasuredLoop
 from bushfit.fitting.prepare_loop import TOLD_MEAN, correlation_text, prepare_loop, recorded_means
@@ -27,6 +28,8 @@ _SMALLEST_OFFSET = 0.02
 #: Ratio of a mean displacement to that which the stiffness of the loop gives for its mean force, above which it counts
 #: from another zero, as the position of an actuator; chosen: rubber creeps and softens by less.
 _MOST_SOFTENING = 10.0
+#: [ln] Difference of frequency above which cycles belong to no step.
+_SAME_FREQUENCY = 0.1
 #: Maximum number of cycles that are compared at each end of a loop; chosen: enough to show settling.
 _MOST_END_CYCLES = 6
 #: Harmonic of the motion above which a spectral line is a ripple, unless a triangle; chosen: waveforms have fewer.
@@ -106,23 +109,26 @@ def describe_loop(loop: Loop, labels: Labels) -> Findings:
     return facts, odd
 
 
-def describe_history(history: Loop, labels: Labels) -> Findings:
+def describe_history(history: Loop, labels: Labels, needed: Sequence[float] = ()) -> Findings:
     """Facts and oddities of a raw stepped-sine history.
 
     Args:
         history: record of the raw history [SI].
         labels: labels in the names of its file and sheet.
+        needed: frequencies [Hz] of cycles that take much of the record.
 
     Returns:
         Facts by name, and a sentence on each oddity.
 
     Raises:
-        MeasurementError: no steady sine in it.
+        MeasurementError: no steady sine in it, or none at one of the needed frequencies.
     """
     reduction = reduce([history])
     steps, (unit, factor) = reduction.steps, history.direction.display.displacement
     levels = sorted({step.level for step in steps})
     frequencies = sorted({step.nominal_frequency for step in steps})
+    if any(min(abs(np.log(one / frequency)) for one in frequencies) > _SAME_FREQUENCY for frequency in needed):
+        raise MeasurementError("not all cycles are steps", found=f"{needed}", expected="three cycles or more of each")
     rows = min(step.rows_per_cycle for step in steps)
     facts = {
         "steps": f"{len(steps)} with steady cycles, at most {max(step.repeat for step in steps)} per point",

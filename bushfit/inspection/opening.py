@@ -35,6 +35,8 @@ from bushfit.validation import validate_tables
 
 #: [Hz] Frequency above which a motion in steps is a stepped sine; chosen: quasi-static loops are slower.
 _QUASI_STATIC = 1.0
+#: Share of a record above which two cycles of one frequency are a test; chosen: steps take less between each other.
+_SLOW_SHARE = 0.1
 #: Distance of a stated preload from the mean of a loop, relative to its range, from which they contradict each other;
 #: chosen: rubber relaxes by less.
 _FAR_FROM_MEAN = 0.5
@@ -215,7 +217,8 @@ def classify_recording(measured: Loop, by_name: Labels, test: LoopFile) -> tuple
     is_fast = fastest > _QUASI_STATIC
     if len(points) > 1 and is_fast:
         with suppress(MeasurementError):  # no steady sine after all
-            return "history", describe_history(measured, by_name)
+            slow = [frequency for frequency, _ in steps if 2.0 / frequency > _SLOW_SHARE * np.ptp(measured.time)]
+            return "history", describe_history(measured, by_name, slow)
     loops = split_record(measured, test)
     if len(loops) > 1:
         return "loop", describe_programme(measured, loops, by_name)

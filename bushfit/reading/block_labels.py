@@ -3,6 +3,7 @@
 A stated value holds for the rows of its block. A condition, a direction and a part hold until others are stated.
 """
 
+import re
 from collections.abc import Sequence
 from itertools import pairwise
 
@@ -14,20 +15,23 @@ from bushfit.reading.roles import CONDITIONS
 
 #: Names of the runs of a test, in the titles of blocks.
 _RUNS = Vocabulary({"repeat": SWEEP_COLUMNS["repeat"]})
+#: Sign of a value, or of more than one cell, in a line that is no title.
+_VALUE = re.compile(r"[:=;,\t]|^[\W\d]*$")
 #: Roles whose values hold until others are stated, with the value for blocks before the first one.
 _HOLDING = {**dict.fromkeys(CONDITIONS, ""), "direction": "not stated", "part": "not stated"}
 
 
 def label_columns(
-    above: Sequence[Sequence[Line]], parts: Sequence[str], vocabulary: Vocabulary, roles: set[str]
+    above: Sequence[Sequence[Line]], vocabulary: Vocabulary, roles: set[str], *, are_sides: bool
 ) -> dict[str, list[str | float]]:
     """Make columns that show what is stated above the block from which a row comes.
 
     Args:
-        above: lines above each block.
-        parts: name of the part in each block, used if nothing else distinguishes the blocks.
+        above: lines above each block. The last line can be its title, which is used if nothing else distinguishes the
+            blocks: "Run 2" counts the repeats, and "before" or "S1" names a part.
         vocabulary: known column names.
         roles: roles for which the blocks already have a column.
+        are_sides: True for blocks side by side, which are not repeats if their titles differ in a number alone.
 
     Returns:
         One text or number per block, by header: quantities that all blocks state, conditions, direction, part, and
@@ -44,9 +48,12 @@ def label_columns(
         distinguishes = len(set(values)) > 1 or role in ("amplitude", "frequency", "direction", *CONDITIONS)
         if role not in roles and distinguishes and None not in values:
             columns[header] = [value for value in values if value is not None]
-    if not columns and len(set(parts)) > 1:
-        are_runs = all(_RUNS.heading(part.rstrip(" #.0123456789")) for part in parts)
-        columns["repeat" if are_runs else "part"] = list(parts)
+    titles = [lines[-1].text.rpartition(": ")[2] if lines else "" for lines in above]
+    are_titles = are_sides or all(title and not _VALUE.search(title) for title in titles)
+    names = {title.rstrip(" #.0123456789") for title in titles}
+    are_runs = all(map(_RUNS.heading, names))
+    if not columns and len(set(titles)) > 1 and are_titles and (are_sides or len(names) > 1 or are_runs):
+        columns["repeat" if are_runs else "part"] = list(titles)
     return columns | {"block": [str(number) for number in range(1, len(stated) + 1)]}
 
 

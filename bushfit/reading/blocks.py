@@ -9,17 +9,13 @@ from itertools import groupby, islice, pairwise, zip_longest
 from typing import NamedTuple
 
 from bushfit import units
-from bushfit.geometry import Direction
 from bushfit.reading.block_labels import is_of_block, label_columns
-from bushfit.reading.headers import SWEEP_COLUMNS, Vocabulary, split_unit
+from bushfit.reading.headers import WORDS, Vocabulary, plain, split_unit, without_mean
 from bushfit.reading.layout import Layout
 from bushfit.reading.lines import WITH_UNIT, Line, is_comment, is_row, is_summary_row, is_units_row
-from bushfit.reading.names import (
-    NO_LABELS,
-    labels_above,
-    named_direction,
-)
+from bushfit.reading.names import NO_LABELS, labels_above
 from bushfit.reading.numerals import is_like_number, plainest_value
+from bushfit.reading.roles import PAIRS
 from bushfit.reading.source import Channels, RowSource, Sheet, Text, cells_of
 
 #: Largest text that is searched for blocks without their own headers [bytes]; chosen: some 100,000 rows.
@@ -32,6 +28,12 @@ _NUMERIC = b"0123456789.,+-eEdD \t\r\n"
 _COMPLEX = re.compile(
     r"\(?\s*([+-]?[\d.,]+(?:[eEdD][+-]?\d+)?)\s*([+-]\s*[\d.,]+(?:[eEdD][+-]?\d+)?)\s*\*?\s*[ij]\s*\)?"
 )
+#: Name of a block in a header: a word, or a word and a number: "K axial [N/mm]", "K*_S1", "tan d Part 1", "K* #2".
+_NAME_OF_SIDE = re.compile(r"(?<![^\s_])([^\W\d_][^\W_]*(?:[\s_]\d+)?|#\d+)(?![^\s_])")
+#: Words for a set point or deviation, which name no block.
+_STATISTICS = frozenset(map(plain, WORDS["qualifiers"]["not_measured"]))
+#: Level of an amplitude in the name of a quantity: "K* 0.1 mm [N/mm]".
+_LEVEL = re.compile(r"(?<![\w.,])\d+(?:[.,]\d+)?\s?(?:[^\W\d]{1,3}|%)(?![^\W_])")
 #: First rows that are searched for complex numbers and units; chosen: room for remarks.
 _FIRST = 8
 
@@ -54,11 +56,13 @@ class Side(NamedTuple):
     Args:
         shared: indices of the columns that all blocks have in common.
         columns: indices of the columns of the block.
+        headers: headers of these columns, without the title of the block.
         title: title of the block, if its headers contain it.
     """
 
     shared: Sequence[int]
     columns: Sequence[int]
+    headers: Sequence[str]
     title: str = ""
 
 
@@ -102,20 +106,20 @@ def combined(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> tuple
     """
     if isinstance(source, Channels) or len(layout.headers) < 2 or layout.headerless:
         return source, layout
-    sides = _find_sides(layout) or _sides_by_direction(layout)
+    sides = _find_sides(layout) or _sides_by_word(layout, vocabulary)
     if sides and (blocks := _side_by_side(source, layout, sides)):
         first = [*sides[0].shared, *sides[0].columns]
-        headers = [_split_direction(header)[0] if sides[0].title else header for header in layout.headers]
-        in_row = tuple(layout.units[index] for index in first)
-        layout = replace(layout, headers=tuple(headers[index] for index in first), units=in_row)
+        headers = (*(layout.headers[index] for index in sides[0].shared), *sides[0].headers)
+        layout = replace(layout, headers=headers, units=tuple(layout.units[index] for index in first))
     elif isinstance(source, Text) and _is_one_block(source, layout):
         return source, layout
     else:
         blocks = _stacked_blocks(source, layout, vocabulary)
     if len(blocks) < 2:
         return _with_plain_cells(source, layout)
-    titles = [block.above[-1].text if block.above else "" for block in blocks] if sides else []
-    added = label_columns([block.above for block in blocks], titles, vocabulary, vocabulary.roles(layout.headers))
+    headings = (vocabulary.heading(*column) for column in zip(layout.headers, layout.units, strict=True))
+    roles = {heading.role for heading in headings if heading}
+    added = label_columns([block.above for block in blocks], vocabulary, roles, are_sides=bool(sides))
     numbers, content, width = list[int](), list[Sequence[str | float]](), len(layout.headers)
     for index, row in ((index, row) for index, block in enumerate(blocks) for row in block.rows):
         cells, texts = cells_of(row, layout.delimiter), [column[index] for column in added.values()]
@@ -132,7 +136,7 @@ def combined(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> tuple
 
 
 def exchange_rows(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> Sheet | None:
-    """Exchange rows and columns of tables with a row for each quantity, such as "f [Hz]; 1; 2; 5".
+    """Exchange rows and columns of tables with a row for each quantity, such as "f [Hz]; 1; 2; 5" or "f; Hz; 1; 2; 5".
 
     Args:
         source: lines or rows of the file.
@@ -142,22 +146,33 @@ def exchange_rows(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> 
     Returns:
         Sheet with the exchanged tables, below the lines above each; None if there is no such table.
     """
-    if not any(map(is_like_number, layout.headers)):
-        return None
     lines = [Line(line.number, list(map(str, cells_of(line, layout.delimiter)))) for line in source.head()]
+    names = [next(filter(None, map(str, line.content)), "") for line in lines]
+    if len(vocabulary.roles([_LEVEL.sub("", name) for name in names if not is_like_number(name)])) < 2:
+        return None
 
-    def has_name(line: Line) -> bool | None:
-        """True for a row with a name, then numbers only; None for any other line."""
-        return (len(line.content) > 3 and all(map(is_like_number, map(str, line.content[1:])))) or None
+    def count_texts(line: Line) -> int | None:
+        """Number of texts in front of the numbers of a row that has both, and nothing behind; None for other lines."""
+        first = next((index for index, cell in enumerate(line.content) if is_like_number(str(cell))), 0)
+        numbers = [str(cell) for cell in line.content[first:] if cell != ""]
+        is_named = any(line.content[:first]) and len(line.content) - first > 2 and all(map(is_like_number, numbers))
+        return first if is_named else None
 
     content, is_exchanged = list[Sequence[str | float]](), False
-    for above, rows in find_segments(lines, has_name):
-        table = [line.content for line in rows]
-        roles = vocabulary.roles([str(cells[0]) for cells in table])
+    for above, rows in find_segments(lines, count_texts):
+        table, group = list[list[str]](), ""
+        for line in rows:
+            texts, numbers = list(map(str, line.content)), list(map(str, line.content[count_texts(line) :]))
+            texts = texts[: len(texts) - len(numbers)]
+            group = texts[0] or group
+            words = sorted(filter(None, (group, *texts[1:])), key=lambda text: bool(_LEVEL.fullmatch(text)))
+            table.append([" ".join(f"[{word}]" if units.is_unit(word) else word for word in words), *numbers])
+        plain_names = [_LEVEL.sub("", cells[0]) for cells in table]
+        roles = vocabulary.roles(plain_names)
         is_table = "frequency" in roles and len(roles) > 2
         is_exchanged |= is_table
         content += [line.content for line in above]
-        content += [list(cells) for cells in zip_longest(*table, fillvalue="")] if is_table else table
+        content += zip_longest(*table, fillvalue="") if is_table else [line.content for line in rows]
     return Sheet(source.sheet or "", content) if is_exchanged else None
 
 
@@ -177,53 +192,65 @@ def _find_sides(layout: Layout) -> list[Side]:
     starts = [index for index, column in enumerate(columns) if column == first]
     sides = [[one for one in columns[start:end] if one[0]] for start, end in pairwise([*starts, len(columns)])]
     is_block = len(sides) > 1 and 1 < len(sides[0]) == len(dict(sides[0])) and all(side == sides[0] for side in sides)
-    return [Side(range(starts[0]), range(start, start + len(sides[0]))) for start in starts] if is_block else []
+    ranges = [range(start, start + len(sides[0])) for start in starts] if is_block else []
+    return [Side(range(starts[0]), columns, [layout.headers[n] for n in columns]) for columns in ranges]
 
 
-def _sides_by_direction(layout: Layout) -> list[Side]:
-    """Columns of each direction of a sweep whose headers differ in the word for the direction alone."""
-    split = [_split_direction(header) for header in layout.headers]
-    columns = {direction: [n for n, one in enumerate(split) if one[1] is direction] for _, direction in split}
-    shared = columns.pop(None, [])
-    names = [[split[index][0] for index in indices] for indices in columns.values()]
-    is_sweep = "frequency" in Vocabulary(SWEEP_COLUMNS).roles([layout.headers[index] for index in shared])
-    if not is_sweep or len(names) < 2 or len(names[0]) < 2 or any(one != names[0] for one in names):
-        return []
-    return [Side(shared, indices, str(direction)) for direction, indices in columns.items()]
+def _sides_by_word(layout: Layout, vocabulary: Vocabulary) -> list[Side]:
+    """Columns of each of several blocks of a sweep whose headers differ in a name: a direction, a part, "before".
 
-
-def _split_direction(header: str) -> tuple[str, Direction | None]:
-    """Split "K axial [N/mm]" into "K [N/mm]" and the direction; None for a header without a direction."""
-    words = header.split()
-    found = [word for word in words if named_direction([word])]
-    if len(found) != 1:
-        return header, None
-    return " ".join(word for word in words if word not in found), named_direction(found)
+    The name is a word with a letter, or such a word and a number, as in "K axial [N/mm]" and "K* Part 1 [N/mm]".
+    """
+    columns = dict[str, dict[int, str]]()
+    for index, header in enumerate(layout.headers):
+        for match in _NAME_OF_SIDE.finditer(header):
+            rest = f"{header[: match.start()].rstrip(' _')} {header[match.end() :].lstrip(' _')}".strip()
+            if plain(match[1]) not in _STATISTICS and without_mean(match[1]):
+                columns.setdefault(match[1], {})[index] = rest
+    for names in map(list, {tuple(by_index.values()): by_index.values() for by_index in columns.values()}.values()):
+        sides = {name: by_index for name, by_index in columns.items() if list(by_index.values()) == names}
+        used = set().union(*sides.values())
+        shared = [index for index in range(len(layout.headers)) if index not in used]
+        is_sweep = "frequency" in vocabulary.roles([layout.headers[index] for index in shared])
+        roles = vocabulary.roles(names)
+        has_stiffness = any({*pair} <= roles for pair in PAIRS if pair[0] != "force_amplitude")
+        if is_sweep and has_stiffness and len(sides) > 1 and len(set(names)) == len(names) == len(roles):
+            return [Side(shared, [*by_index], names, name) for name, by_index in sides.items()]
+    return []
 
 
 def _side_by_side(source: RowSource, layout: Layout, sides: Sequence[Side]) -> list[Segment]:
-    """Separate blocks of columns side by side, with or without titles above them.
+    """Separate blocks of columns side by side; the lines above each are the cells above it that the others lack.
 
     Blocks that share columns are separated only if their titles differ; otherwise the list is empty.
     """
-    head = [line for line in reversed(source.head()) if line.number < layout.header_line]
+    head = [line for line in source.head() if line.number < layout.header_line]
     rows = [line for line in source.lines(layout.lines_before_data) if not is_comment(line.content, layout.delimiter)]
     width = len(layout.headers)
-    above, below = (
-        [(line.number, [*cells_of(line, layout.delimiter), *[""] * width]) for line in lines] for lines in (head, rows)
-    )
-    blocks = list[Segment]()
-    for shared, columns, title in sides:
-        titles = [Line(number, str(cells[n])) for number, cells in above for n in columns if cells[n] != ""]
-        titles = [Line(layout.header_line, title)] if title else titles[:1]
-        data = [
-            Line(number, [cells[n] for n in (*shared, *columns)])
-            for number, cells in below
-            if any(cells[n] != "" for n in columns)
-        ]
-        blocks.append(Segment(titles, data))
-    is_titled = len({title.text for block in blocks for title in block.above}) == len(blocks)
-    return blocks if is_titled or not sides[0].shared else []
+    titles: list[list[Line]] = [[Line(layout.header_line, side.title)] * bool(side.title) for side in sides]
+    for line in head if not sides[0].title else ():
+        cells = list(map(str, cells_of(line, layout.delimiter)))
+        padded = [*cells, *[""] * width]
+        of_sides = [next((padded[n] for n in side.columns if padded[n]), "") for side in sides]
+        of_sides = cells[1:] if len(cells) == len(sides) + 1 and "" in of_sides else of_sides
+        if "" not in of_sides and len(set(of_sides)) > 1:
+            name = cells[0].strip("# ").rstrip(":") if cells[0] != of_sides[0] else ""
+            for lines, cell in zip(titles, of_sides, strict=True):
+                lines.append(Line(line.number, f"{name}: {cell}" if name else cell))
+    if sides[0].shared and len({tuple(line.text for line in lines) for lines in titles}) < len(sides):
+        return []
+    below = [(line.number, [*cells_of(line, layout.delimiter), *[""] * width]) for line in rows]
+    return [
+        Segment(
+            lines,
+            [
+                Line(number, [cells[n] for n in (*side.shared, *side.columns)])
+                for number, cells in below
+                if any(cells[n] != "" for n in side.columns)
+            ],
+        )
+        for side, lines in zip(sides, titles, strict=True)
+    ]
 
 
 def _stacked_blocks(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> list[Segment]:

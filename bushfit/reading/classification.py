@@ -77,6 +77,8 @@ def classify(
             continue
         if heading is None or (plain_name(header) == "k" and heading.role in roles):
             continue
+        if heading.role == "time" and table.labels_above.sampling and all(row[index] == "" for row in table.first_rows):
+            continue  # the X_Value of LabVIEW, whose step is stated above
         role, column = heading.role, column_of(table, heading, index, stated_units.get(heading.role))
         if heading.extreme:
             extremes.setdefault((role, heading.extreme), column)

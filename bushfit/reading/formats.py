@@ -1,4 +1,4 @@
-"""Recordings of MATLAB, TDMS, MDF, LabVIEW, Parquet and Arrow, as groups of channels.
+"""Recordings of MATLAB, TDMS, MDF, Parquet and Arrow, as groups of channels.
 
 Each reader takes the bytes of a file and its path, imports its library when it is called, and yields groups. The unit
 of a channel is "" if the file does not state it.
@@ -6,21 +6,17 @@ of a channel is "" if the file does not state it.
 
 import io
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import pairwise, takewhile
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bushfit import units
-from bushfit.reading.files import to_utf8
 from bushfit.reading.source import Channel, Group
 
 #: Largest number of values in a file; chosen: ten million rows of twenty channels and more, 2 GiB.
 _MOST_VALUES = 1 << 28
-#: Largest number of header lines of a LabVIEW measurement file; chosen: files have some twenty.
-_LVM_HEAD = 40
-_LVM_END = "***End_of_Header***"
 
 
 def matlab(data: bytes, _: Path) -> Iterator[Group]:
@@ -77,30 +73,78 @@ def _refuse_too_many(values: int) -> None:
 def _in_struct(path: str, content: Mapping[str, Any]) -> Iterator[Group]:
     """Yield the vectors and matrix columns of a struct as a group of channels, then the groups of structs inside it.
 
+    Scalars and texts of the struct are its properties. Cells with as many texts as a matrix has columns name the
+    columns. If a vector has a value for each column of the matrices, such as an amplitude, each column is a group.
+
     Args:
         path: name of the struct, which names the group.
         content: variables of the struct by name.
     """
-    channels: list[Channel] = []
-    labels: list[tuple[str, str]] = []
-    inner: dict[str, Mapping[str, Any]] = {}
-    for name, value in content.items():
+    fields = {name: value for name, value in content.items() if not name.startswith("__")}
+    arrays = {name: value for name, value in fields.items() if isinstance(value, np.ndarray)}
+    texts = [value for value in arrays.values() if value.dtype.kind in "UO" and value.ndim > 0]
+    names_by_width = {rows.shape[-1]: _column_names(np.atleast_2d(rows)) for rows in texts}
+    matrices = {name: value for name, value in arrays.items() if value.ndim == 2 and value.dtype.kind not in "UO"}
+    shapes = {value.shape for value in matrices.values()}
+    rows, columns = shapes.pop() if len(shapes) == 1 else (0, 0)
+    of_rows = {
+        n: one for n, one in arrays.items() if one.ndim == 1 and (one.dtype.kind not in "UO" or one.size != columns)
+    }
+    channels = [Channel(*one) for one in of_rows.items()]
+    levels = [one for one in channels if one.values.dtype.kind in "fiu" and len(one.values) == columns != rows]
+    labels = [(name, str(value)) for name, value in fields.items() if isinstance(value, str | float | int | np.number)]
+    inner = dict[str, Mapping[str, Any]]()
+    for name, value in fields.items():
         place = f"{path}.{name}" if path else name
-        if name.startswith("__"):
-            continue
-        if isinstance(value, Mapping):
+        if isinstance(value, Mapping) and {"x_values", "y_values"} <= value.keys():
+            channels.append(_waveform(name, value))
+        elif isinstance(value, Mapping):
             inner[place] = value
         elif isinstance(value, list):
             inner |= {f"{place}({n})": one for n, one in enumerate(value, start=1) if isinstance(one, Mapping)}
-        elif isinstance(value, np.ndarray) and value.ndim == 1:
-            channels.append(Channel(name, value))
-        elif isinstance(value, np.ndarray) and value.ndim == 2:
-            channels.extend(Channel(f"{name}(:,{n})", column) for n, column in enumerate(value.T, start=1))
-        elif isinstance(value, str):
-            labels.append((name, value))
-    yield path, channels, labels
+    if len(levels) == 1:
+        others = [one for one in channels if one is not levels[0]]
+        for n, level in enumerate(levels[0].values):
+            of_level = [Channel(name, value[:, n]) for name, value in matrices.items()]
+            title = f"{path} {levels[0].name} = {level:g}".strip()
+            yield title, others + of_level, [*labels, (levels[0].name, f"{level:g}")]
+    else:
+        for name, value in matrices.items():
+            usual = [f"{name}(:,{n})" for n in range(1, value.shape[1] + 1)]
+            names = names_by_width.get(value.shape[1], usual)
+            channels += [Channel(*column) for column in zip(names, value.T, strict=True)]
+        yield path, channels, labels
     for place, struct in inner.items():
         yield from _in_struct(place, struct)
+
+
+def _column_names(rows: NDArray[Any]) -> list[str]:
+    """Names of columns from the last row of texts, (rows, columns), or the last two if the last one has units alone."""
+    last = [str(cell) for cell in rows[-1]]
+    if len(rows) < 2 or not all(map(units.is_unit, last)):
+        return last
+    return [f"{name} [{unit}]" for name, unit in zip(rows[-2], last, strict=True)]
+
+
+def _waveform(name: str, content: Mapping[str, Any]) -> Channel:
+    """Convert a function of Simcenter Testlab to a channel with its x axis as base.
+
+    Args:
+        name: name of its struct, used if the function has no name.
+        content: fields of its struct: x_values and y_values, with their quantities, and function_record.
+    """
+    x, y = content["x_values"], content["y_values"]
+    unit, x_unit = (str(axis.get("quantity", {}).get("label", "")) for axis in (y, x))
+    values = np.asarray(y["values"])
+    over = _even_base(x.get("start_value", 0.0), x.get("increment", 1.0), len(values), x_unit)
+    return Channel(str(content.get("function_record", {}).get("name", "") or name), values, unit, over)
+
+
+def _even_base(start: float, step: float, count: int, unit: str) -> Channel:
+    """Base channel with `count` even steps from `start`, both in `unit`: a time, a frequency, or another axis, "x"."""
+    bases = {"Hz": "frequency", "s": "time"}
+    name = next((name for si, name in bases.items() if units.is_compatible(unit, si)), "x")
+    return Channel(name, start + step * np.arange(count), unit)
 
 
 def tdms(data: bytes, _: Path) -> Iterator[Group]:
@@ -120,9 +164,7 @@ def tdms(data: bytes, _: Path) -> Iterator[Group]:
             properties, values, over = channel.properties, channel[:], None
             if step := properties.get("wf_increment"):
                 unit = properties.get("wf_xunit_string") or "s"
-                bases = {"Hz": "frequency", "s": "time"}
-                name = next((name for si, name in bases.items() if units.is_compatible(unit, si)), "x")
-                over = Channel(name, properties.get("wf_start_offset", 0.0) + step * np.arange(len(values)), unit)
+                over = _even_base(properties.get("wf_start_offset", 0.0), step, len(values), unit)
             unit = properties.get("unit_string") or properties.get("NI_UnitDescription", "")
             channels.append(Channel(channel.name, values, unit, over))
         yield group.name, channels, [*file.properties.items(), *group.properties.items()]
@@ -173,39 +215,3 @@ def arrow(data: bytes, _: Path) -> Iterator[Group]:
         plain = column.dt.tz_localize(None) if getattr(column.dtype, "tz", None) else column
         channels.append(Channel(field.name, plain.to_numpy(), unit))
     yield "", channels, ()
-
-
-def labview(data: bytes, file: Path) -> Iterator[Group]:
-    """Read the channels of a LabVIEW measurement file, with their time or other x axis as base.
-
-    Yields:
-        A group for each segment.
-    """
-    lines = to_utf8(data, file)[0].decode().splitlines()
-    head = dict(line.split(None, 1) for line in lines[:_LVM_HEAD] if len(line.split(None, 1)) == 2)
-    mark = "," if head.get("Separator", "Tab").strip() == "Comma" else "\t"
-    point = head.get("Decimal_Separator", ".").strip()
-    ends = [number for number, line in enumerate(lines) if line.startswith(_LVM_END)]
-    for segment, (start, end) in enumerate(pairwise([*ends, len(lines) + _LVM_HEAD]), start=1):
-        names, *rows = [line.split(mark) for line in lines[start + 1 : end] if line.strip()] or [[""]]
-        if "X_Value" not in names:
-            continue  # the header of the file, not of a segment
-        above = {cells[0]: cells[1:] for line in lines[:start] if (cells := line.split(mark))}
-        rows = list(takewhile(lambda cells: cells[0] != "Channels", rows))
-        numbers = [[float(cell.replace(point, ".") or "nan") for cell in row[: len(names)]] for row in rows if row]
-        width = min(len(row) for row in numbers)
-        columns, channels, over = np.array([row[:width] for row in numbers]).T, [], None
-        step, first = (float(above[key][0].replace(point, ".")) for key in ("Delta_X", "X0"))
-        counted = first + step * np.arange(len(numbers))
-        units_of, dimension = iter(above.get("Y_Unit_Label", ())), above.get("X_Dimension", ["Time"])[0]
-        for name, values in zip(names, columns, strict=False):
-            if name == "X_Value":
-                is_time = dimension.strip() in ("Time", "")
-                over = Channel(
-                    "time" if is_time else dimension,
-                    counted if np.isnan(values).all() else values,
-                    "s" if is_time else "",
-                )
-            elif name != "Comment":
-                channels.append(Channel(name, values, next(units_of, "").strip(), over))
-        yield f"segment {segment}" if len(ends) > 2 else "", channels, ()

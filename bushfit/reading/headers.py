@@ -99,6 +99,8 @@ _MEANS = re.compile(
 _FOOTNOTES = str.maketrans("", "", "\u00b9\u00b2\u00b3\u2070\u2074\u2075\u2076\u2077\u2078\u2079\u2020\u2021")
 #: Units with which the symbol f cannot mean a role, by name and role.
 _UNITS_NOT_F = {("f", "force"): ("Hz",), ("famplitude", "force_amplitude"): ("Hz",), ("f", "frequency"): ("N", "N m")}
+#: Units that a role cannot have, by role: "Amplitude [N/m]" is the magnitude of a stiffness.
+_UNITS_NOT = {"amplitude": ("N/m", "N*m/rad")}
 #: Units with which a short or ambiguous name means a role, by name and role.
 _UNITS_OF = {
     (name, role): si
@@ -107,6 +109,8 @@ _UNITS_OF = {
 }
 #: Names of an amplitude that imply peak-to-peak.
 PEAK_TO_PEAK_NAMES = frozenset(WORDS["counting"]["peak_to_peak"])
+#: Name of an amplitude that may be peak-to-peak: a stroke, unless it is called its amplitude.
+STROKE = re.compile("|".join(WORDS["counting"]["stroke"]), re.IGNORECASE)
 #: Parts of the patterns of conventions: ends of words, and the end of a symbol ("Fmax") or unit ("mmpp") before them.
 _PARTS = {part: "|".join(WORDS["conventions"][part]) for part in ("start", "symbol", "end", "unit", "peak")}
 #: Key in words.toml of the words for each convention, in the order in which they are tried.
@@ -136,7 +140,7 @@ _SPELLINGS: dict[int, int | str] = {
 #: End of a name before a unit without brackets: "force_N", "Kraft in N", "F / kN", "load, N".
 _NAME_END = re.compile(r"\s+in\s+|\s*/\s*|\s*,\s*|\s+|_")
 #: Newton per a length in a name without capitals: "n_per_mm"; and the word before a part of such a unit.
-_PER_OF_NEWTON, _PER = re.compile(r"\bn per "), re.compile(r"(?<![^\W_])per$")
+_PER_OF_NEWTON, _PER = re.compile(r"(?<![^\W_])n[ _]per[ _]"), re.compile(r"(?<![^\W_])per$")
 
 
 @dataclass(frozen=True)
@@ -310,7 +314,8 @@ def fits(word: str, role: str, unit: str | None) -> bool:
         return bool(units.kelvin_scale(unit))  # else a time, or another quantity
     if unit and (expected := _UNITS_OF.get((word, role))):
         return any(units.is_compatible(unit, si) for si in expected)
-    return not any(units.is_compatible(unit or "", si) for si in _UNITS_NOT_F.get((word, role), ()))
+    excluded = (*_UNITS_NOT_F.get((word, role), ()), *_UNITS_NOT.get(role, ()))
+    return not any(units.is_compatible(unit or "", si) for si in excluded)
 
 
 @lru_cache(maxsize=4096)
@@ -381,7 +386,7 @@ def _splits(text: str) -> Iterator[tuple[str, str | None, bool]]:
     yield name, unit, True
     if unit is None:
         for end in reversed(list(_NAME_END.finditer(name))):
-            text = _PER_OF_NEWTON.sub("N/", name[end.end() :].replace("_", " "))
+            text = _PER_OF_NEWTON.sub("N/", name[end.end() :].strip(" _"))
             text = "N" if text == "n" and end.start() > 1 else text  # "force_n" in names without capitals
             if _PER.search(name[: end.start()]):
                 continue  # a part of a unit such as N_per_mm
@@ -390,5 +395,7 @@ def _splits(text: str) -> Iterator[tuple[str, str | None, bool]]:
 
 
 def _folded(text: str) -> str:
-    """Text in lower case without accents, with the same number of characters."""
-    return "".join(unicodedata.normalize("NFKD", letter)[0] for letter in text.lower())
+    """Text in lower case without accents, with the same number of characters; syllables of Hangul stay whole."""
+    return "".join(
+        letter if "가" <= letter <= "힣" else unicodedata.normalize("NFKD", letter)[0] for letter in text.lower()
+    )

@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from bushfit.errors import MeasurementError
-from bushfit.reading.formats import arrow, labview, matlab, mdf, tdms
+from bushfit.reading.formats import arrow, matlab, mdf, tdms
 from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS, Vocabulary
 from bushfit.reading.layout import Layout
 from bushfit.reading.lines import Line
@@ -61,7 +61,6 @@ _FORMATS = (
     Format("TDMS", (".tdms",), rb"TDSm", tdms),
     Format("UFF", (".uff", ".unv"), rb" {4}-1 *\r?\n +\d+", uff, _UFF_HINT),
     Format("MDF", (".mf4", ".mdf"), rb"MDF     |UnFinMF ", mdf),
-    Format("LabVIEW", (".lvm",), rb"LabVIEW Measurement", labview),
     Format("Parquet or Arrow", (".parquet", ".feather", ".arrow"), rb"PAR1|ARROW1", arrow),
     Format("", (), rb"PK\x03\x04|\xd0\xcf\x11\xe0", workbook, again="save it again as xlsx, or as CSV"),
 )
@@ -82,9 +81,7 @@ def format_of(data: bytes, file: Path) -> Format | None:
     """
     by_content = next((recording for recording in _FORMATS if re.match(recording.sign, data)), None)
     by_ending = next((recording for recording in _FORMATS if file.suffix.lower() in recording.endings), None)
-    if (
-        by_ending and not by_content and by_ending.read is not labview
-    ):  # LabVIEW also writes plain tables under this ending
+    if by_ending and not by_content:
         raise MeasurementError(
             f"this is not a {by_ending.name} file",
             file=file,

@@ -11,13 +11,13 @@ import re
 from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import product
+from itertools import product, takewhile
 from typing import Annotated, Literal
 
 from pydantic import BeforeValidator
 
 from bushfit.caveat import Caveat
-from bushfit.reading.headers import Vocabulary, plain, split_unit
+from bushfit.reading.headers import WORDS, Vocabulary, plain, split_unit
 from bushfit.reading.lines import MOST_COLUMNS, Content, Line, is_comment, is_row, is_units_row, split
 from bushfit.reading.numerals import is_like_number
 from bushfit.reading.roles import is_test, is_unit_alone, stated_once
@@ -37,6 +37,9 @@ _MOST_HEADINGS = 50
 _LONGEST_HEADER = 10_000
 #: Non-empty lines below a header that are searched for its units row and first numbers; chosen: room for comments.
 _LINES_BELOW_HEADER = 8
+#: Names in the first cells of rows that describe the columns, such as "Unit" and "dx"; and of rows of units among them.
+_UNIT_ROWS = frozenset(map(plain, WORDS["rows_of"]["units"]))
+_DESCRIPTIONS = _UNIT_ROWS | frozenset(map(plain, WORDS["rows_of"]["descriptions"]))
 #: A number with a number sign: "#1".
 _NUMBERED = re.compile(r"#\s?\d+\b")
 #: Blanks between a name and the bracket of its unit, which do not separate columns.
@@ -85,6 +88,7 @@ class Layout:
         headerless: True if the table has no header.
         notes: warnings on columns that are left out or filled.
         levels: indices of columns, such as the amplitude, that are empty if they have the value of the row above.
+        described_line: number of the last row below the header that describes the columns; 0 without such rows.
     """
 
     delimiter: str
@@ -97,11 +101,12 @@ class Layout:
     headerless: bool = False
     notes: tuple[Caveat, ...] = ()
     levels: frozenset[int] = frozenset()
+    described_line: int = 0
 
     @property
     def lines_before_data(self) -> int:
         """Number of the last line before the first row of data: its units row, or else its header."""
-        return self.units_line or self.header_line - self.headerless
+        return max(self.header_line - self.headerless, self.units_line or 0, self.described_line)
 
     def is_repeated(self, cells: Sequence[str]) -> bool:
         """True if a row repeats the header or the row of units, even if blanks in names split it differently."""
@@ -236,8 +241,8 @@ def _likeliest(
 ) -> tuple[int, str, list[str]]:
     """Find the likeliest header if no line names the columns of a test.
 
-    The header is the last line above the first row of numbers that has as many cells, or else that row itself; without
-    rows of numbers, the first line.
+    The header is the last line above the first row of numbers that has as many cells, or one more, or else that row
+    itself; without rows of numbers, the first line.
 
     Args:
         lines: non-empty lines at the start of the file.
@@ -258,8 +263,11 @@ def _likeliest(
     for delimiter, row in rows:
         cells = {index: split(lines[index].content, delimiter) for index in reversed(before)}
         of_units = {index for index in cells if is_units_row(cells[index])}
-        fitting = [index for index in cells if len(row) == len(cells[index]) and index not in of_units]
+        fitting = [
+            n for n in cells if 0 <= len(cells[n]) - len(row) < 2 and n not in of_units
+        ]  # a comment may be empty
         if fitting:
+            of_units -= {index for index in of_units if _is_labelled_units_row(cells[index], len(cells[index]))}
             index = next((index for index in fitting if index + 1 in of_units), fitting[0])
             return index, delimiter, cells[index]
     return end, *max(rows, key=lambda entry: len(entry[1]))
@@ -283,7 +291,14 @@ def _layout(
     if all(is_like_number(cell) for cell in headers) and len(headers) > 1:
         return Layout(delimiter, tuple(map(str, range(1, len(headers) + 1))), number, tuple(row), None, headerless=True)
     below = [(line.number, split(line.content, delimiter)) for line in _below(lines, index, delimiter)]
-    if below:
+    above = ((line.number, split(line.content, delimiter)) for line in reversed(lines[:index]))
+    described = [*takewhile(lambda one: one[1][0] and not is_like_number(one[1][0]), below)]
+    if not any(plain(cells[0]) in _DESCRIPTIONS for _, cells in described):
+        described = []
+    of_units = [(line, cells) for line, cells in (*described, *above) if _is_labelled_units_row(cells, len(headers))]
+    if of_units:
+        units_line, row = of_units[0][0], ["", *of_units[0][1][1:], *row][: len(headers)]
+    elif below:
         cells = [cell.strip("[]() ") for cell in below[0][1]]
         if delimiter == " " and isinstance(text := next(_below(lines, index, delimiter)).content, str):
             wide = [cell.strip("[]() ") for cell in _below_headers(str(lines[index].content), text)]
@@ -293,7 +308,10 @@ def _layout(
             units_line, row = below[0][0], [*cells, *row][: len(headers)]
         elif any(named) and [*map(bool, named)] == [*map(bool, cells)] and not vocabulary.roles(headers[: len(cells)]):
             units_line, headers = below[0][0], [*cells, *headers[len(cells) :]]
+    below = below[len(described) :]
     widths = {len(cells) for _, cells in below if is_row(cells)}
+    if described and widths == {len(headers) - 1}:  # the names of the rows have a column of their own
+        headers, row = headers[1:], row[1:]
     may_be_decimal = delimiter == "," and not any("." in cell for _, cells in below for cell in cells)
     if len(widths) == 1 and len(headers) < (width := widths.pop()) < 2 * len(headers) and not may_be_decimal:
         # R writes no header for the names of rows, which come first
@@ -302,14 +320,22 @@ def _layout(
         first = are_numbered or any(not is_like_number(cell) for cell in counts)
         unnamed = [""] * (width - len(headers))
         headers, row = ([*unnamed, *headers], [*unnamed, *row]) if first else ([*headers, *unnamed], [*row, *unnamed])
-    contents = [line.content for line in lines[index + 1 :] if line.number != units_line]
+    described_line = described[-1][0] if described else 0
+    contents = [line.content for line in lines[index + 1 :] if line.number not in (units_line, *dict(described))]
     numbered = bool(contents) and all(
         _NUMBERED.match(next(filter(None, split(content, delimiter)), "")) for content in contents
     )
     levels = stated_once(headers, (split(content, delimiter) for content in contents), vocabulary)
     names = ", ".join(f'"{headers[index]}"' for index in sorted(levels))
     notes = (Caveat("cells_filled", f"{names}: an empty cell has the value of the cell above"),) if levels else ()
-    return Layout(delimiter, tuple(headers), number, tuple(row), units_line, (), numbered, False, notes, levels)
+    return Layout(
+        delimiter, tuple(headers), number, tuple(row), units_line, (), numbered, False, notes, levels, described_line
+    )
+
+
+def _is_labelled_units_row(cells: Sequence[str], width: int) -> bool:
+    """True if a row of at most `width` cells begins with a word such as "Unit", and half of the others are units."""
+    return 1 < len(cells) <= width and plain(cells[0]) in _UNIT_ROWS and is_units_row(cells[1:])
 
 
 def _below_headers(header: str, row: str) -> list[str]:

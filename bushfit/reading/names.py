@@ -15,6 +15,7 @@ from bushfit.geometry import Direction
 from bushfit.reading.headers import (
     COUNTED,
     PEAK_TO_PEAK_NAMES,
+    STRAINING_COLUMNS,
     SWEEP_COLUMNS,
     WORDS,
     AmplitudeConvention,
@@ -67,10 +68,17 @@ _KEY_OF = {
     }.items()
     for name in names
 }
+#: Names of the step between rows, whose unit is that of the x axis, and names of this unit.
+_STEPS, _X_UNITS = (frozenset(map(plain, WORDS["rows_of"][key])) for key in ("steps", "x_units"))
 #: SI unit of the two keys for the time between rows.
 _SAMPLING = {"sampling_rate": "Hz", "sampling_interval": "s"}
 #: Usual names of amplitude and frequency above a table.
-_VOCABULARY = Vocabulary({role: SWEEP_COLUMNS[role] for role in ("frequency", "amplitude")}, {})
+_VOCABULARY = Vocabulary(
+    {
+        "frequency": SWEEP_COLUMNS["frequency"],
+        "amplitude": [*SWEEP_COLUMNS["amplitude"], *STRAINING_COLUMNS["amplitude"]],
+    }
+)
 #: Separator between a name and its value above a table.
 _AFTER_KEY = re.compile(r"\t|;|:\s|:$|\s=\s|=|,(?!\d)|(?<=[^\W\d]),")
 #: Blank between a name and its value at the end of a line: "Sample rate 512 Hz".
@@ -216,7 +224,9 @@ def labels_above(lines: Iterable[Line]) -> Labels:
     lines = list(lines)
     conventions = {found for line in lines if (found := _convention_in_line(line))}
     convention = conventions.pop() if len(conventions) == 1 else None
-    labels = reduce(or_, map(_label_in_line, lines), Labels(convention=convention))
+    rows = map(_name_and_values, lines)
+    x_unit = next((row[1] for row in rows if len(row) > 1 and plain(row[0]) in _X_UNITS and units.is_unit(row[1])), "s")
+    labels = reduce(or_, (_label_in_line(line, x_unit) for line in lines), Labels(convention=convention))
     return labels | Labels(specimen_number=labels.part_number)
 
 
@@ -241,8 +251,8 @@ def is_remark(text: str) -> bool:
     return any(plain(word).startswith(_REMARKS) for word in _LETTERS.findall(text))
 
 
-def _label_in_line(line: Line) -> Labels:
-    """Label in a line of text or row of a sheet that has a name and a value; no labels in any other line."""
+def _name_and_values(line: Line) -> list[str]:
+    """Cells of a line of text or row of a sheet: a name, then its values; one cell without a value."""
     if isinstance(line.content, str):
         cells = _AFTER_KEY.split(line.content.lstrip("#%/; "))
     else:
@@ -252,9 +262,21 @@ def _label_in_line(line: Line) -> Labels:
     if len(cells) == 1 and (end := _BEFORE_VALUE.search(split_convention(cells[0])[0])):
         convention = split_convention(cells[0])[1]
         cells = [end.string[: end.start()], f"{end.string[end.end() :]} {COUNTED[convention]}"]
+    return cells
+
+
+def _label_in_line(line: Line, x_unit: str) -> Labels:
+    """Label in a line that has a name and a value; no labels in any other line.
+
+    Args:
+        line: line of text or row of a sheet.
+        x_unit: unit of the step between rows, such as dx, if the line states none.
+    """
+    cells = _name_and_values(line)
     if len(cells) < 2 or len(cells[0]) > _LONGEST_VALUE:
         return NO_LABELS
-    name, unit = units.split_header(cells[0])
+    (name, unit), heading = units.split_header(cells[0]), _VOCABULARY.heading(cells[0])
+    unit = unit or (heading.unit if heading else None)
     values: dict[str, Any] = {}
     key, forms = _KEY_OF.get(plain(name)), (cells[1], " ".join(cells[1:3]), f"{cells[1]} {unit or ''}")
     if key in ("date", "operator", "specimen_number", "part_number"):
@@ -265,12 +287,12 @@ def _label_in_line(line: Line) -> Labels:
     if key == "direction":
         return Labels(direction=named_direction([cells[1]], short=True))
     if key in _SAMPLING:
-        usual = "Hz" if key == "sampling_rate" else "s" if plain(name) == "wfincrement" else ""
-        for form in (forms[1], f"{cells[1]} {unit or usual}"):
+        usual = "Hz" if key == "sampling_rate" else x_unit if plain(name) in _STEPS else ""
+        for form in (*forms[:2], f"{cells[1]} {unit or usual}"):
             match = _NUMBER_AND_UNIT.fullmatch(form)
             if match and units.is_compatible(rate_unit := _SAMPLES.sub(r"\1Hz", match["unit"]), _SAMPLING[key]):
                 return Labels(sampling=f"{match['number']} {rate_unit}")
-    heading, expected = _VOCABULARY.heading(cells[0]), {"temperature": ["K"], "preload": ["m", "N"]}.get(key or "", [])
+    expected = {"temperature": ["K"], "preload": ["m", "N"]}.get(key or "", [])
     for text in (_COMMA.sub(r"\1.", form) for form in forms):
         if any(_is_quantity(text, unit) for unit in expected):
             values = {str(key): text}

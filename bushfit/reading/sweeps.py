@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,7 +13,7 @@ from bushfit import units as si
 from bushfit.caveat import Caveat
 from bushfit.geometry import Place, strain_factor_of_files
 from bushfit.reading.finding import find_table
-from bushfit.reading.headers import SWEEP_COLUMNS, ZERO_TO_PEAK, AmplitudeConvention, Column
+from bushfit.reading.headers import STROKE, SWEEP_COLUMNS, ZERO_TO_PEAK, AmplitudeConvention, Column
 from bushfit.reading.labelled import Rows, column_texts, note_not_understood
 from bushfit.reading.levels import mean_temperature, rows_of_test
 from bushfit.reading.measurement import Floats, Sweep
@@ -21,7 +21,7 @@ from bushfit.reading.parts import OpenedFile
 from bushfit.reading.preload import parse_preload
 from bushfit.reading.rejected import check_positive
 from bushfit.reading.roles import AGREEING_PAIRS, si_unit
-from bushfit.reading.runs import runs_of
+from bushfit.reading.runs import group_rows, runs_of
 from bushfit.reading.si_columns import si_column
 from bushfit.reading.stated import SweepFile
 from bushfit.reading.stiffness import check_stiffness, complex_stiffness, stiffness_pair, with_positive_loss
@@ -106,6 +106,11 @@ def read_sweep(
     kelvin = test.temperature if degrees is None else degrees + si.CELSIUS
     temperature = mean_temperature(degrees) if test.temperature is None else test.temperature
     repeat = _repeat_numbers(table, values)
+    if repeat is None and (copies := _copied_rows(points, values.values())).any():
+        selected = selected[~copies[selected]]
+        count = int(copies.sum())
+        sentence = f"left out: {count} row{'s' * (count > 1)} equal to another row of the same point, in all columns"
+        notes += (Caveat("repeated_rows", sentence),)
     frequency, amplitude = frequency[selected], values["amplitude"][selected]
     reached = values["amplitude_reached"][selected] if "amplitude_reached" in values else None
     runs = runs_of(frequency, amplitude, None if repeat is None else repeat[selected], test.stepped)
@@ -170,6 +175,14 @@ def sweep_columns(
             expected="one convention",
             hint="correct one of them; what the header states needs no key in the campaign",
         )
+    if not (in_header or convention) and "amplitude" in columns and STROKE.match(columns["amplitude"].header):
+        raise table.header_error(
+            "this amplitude may be a stroke, which is peak-to-peak",
+            column=columns["amplitude"],
+            found=f'"{columns["amplitude"].header}"',
+            expected="p-p, rms or 0-p in the header",
+            hint='amplitude = "peak-to-peak" in the campaign, or amplitude = "zero-to-peak" if it is half the stroke',
+        )
     convention = in_header or convention or "zero-to-peak"
     force = columns.get("force_amplitude")
     if force and not force.convention and convention != "zero-to-peak":
@@ -185,6 +198,22 @@ def sweep_columns(
         if column := columns.get(role):
             columns[role] = replace(column, scale=ZERO_TO_PEAK[column.convention or convention] * column.scale)
     return columns
+
+
+def _copied_rows(points: Sequence[Floats], values: Collection[Floats]) -> NDArray[np.bool_]:
+    """Mask of the rows, (n,), that equal an earlier row at a point that has more rows than most points.
+
+    Args:
+        points: frequency and amplitude of each row, (n,) each.
+        values: all numbers of each row, (n,) each.
+    """
+    groups = group_rows(*points)
+    usual = np.median([rows.size for rows in groups])
+    copies = np.zeros(points[0].size, dtype=bool)
+    for rows in (rows for rows in groups if rows.size > usual):
+        numbers = np.stack([column[rows] for column in values])
+        copies[np.delete(rows, np.unique(numbers, axis=1, return_index=True)[1])] = True
+    return copies
 
 
 def _repeat_numbers(table: Table, values: Mapping[str, Floats]) -> NDArray[np.int64] | None:

@@ -261,7 +261,9 @@ class Table:
     @cached_property
     def lines_above(self) -> list[Line]:
         """Non-empty lines above the table, and notes below it; a footnote is behind the header that refers to it."""
-        lines = [line for line in self.source.head() if line.number < self.layout.header_line]
+        not_above = (self.layout.header_line, self.layout.units_line)
+        last = self.layout.lines_before_data
+        lines = [line for line in self.source.head() if line.number <= last and line.number not in not_above]
         marks = {mark: header for header in self.headers for mark in _FOOTNOTE_MARK.findall(header)}
         for line in self.source.tail():
             cells = list(map(str, cells_of(line, self.layout.delimiter)))

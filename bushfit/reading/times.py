@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bushfit import units
+from bushfit.reading.headers import WORDS
 from bushfit.reading.measurement import Floats
 from bushfit.reading.numerals import ALL_NUMERALS
 
@@ -21,8 +22,13 @@ _CLOCK = re.compile(
     r"(?:(?P<days>\d+) days?,?\s+)?(?:(?P<h>\d{1,4}):)?(?P<m>\d{1,4}):(?P<s>\d{1,2}(?:[.,:]\d+)?)"
     r"\s*(?P<half>[AaPp]\.?[Mm]\.?)?"
 )
-#: Date before a clock: 2026-11-26T, 26.11.2026, 11/26/2026.
-_DATE = re.compile(r"(?P<a>\d{1,4})[-./](?P<b>\d{1,2})[-./](?P<c>\d{1,4})(?:[T\s,]+|$)")
+#: Date before a clock: 2026-11-26T, 26.11.2026, 11/26/2026, 26 11 2026.
+_DATE = re.compile(r"(?P<a>\d{1,4})[-./\s]+(?P<b>\d{1,2})[-./,\s]+(?P<c>\d{1,4})(?:[T_\s,-]+|$)")
+#: Date and clock without separators, or with hyphens alone: 20261126 200710, 2026-11-26_20-07-10.
+_COMPACT = re.compile(r"(\d{4})-?(\d\d)-?(\d\d)[T\s_-]?(\d\d)[-_]?(\d\d)[-_]?(\d\d)(?![\d:])")
+#: Number of a month by the first three letters of its name.
+_MONTHS = {word: number for number, words in enumerate(WORDS["dates"]["months"], start=1) for word in words.split()}
+_MONTH = re.compile(rf"(?<![^\W\d])({'|'.join(_MONTHS)})[^\W\d]*\.?", re.IGNORECASE)
 #: Time zone after a clock.
 _ZONE = re.compile(r"\s*(?:Z|UTC|GMT|[+-]\d\d:?\d\d)$")
 #: Day numbers of spreadsheets from 1954 to 2119; chosen: all dates of tests.
@@ -40,7 +46,8 @@ def clock(text: str) -> float | None:
     Returns:
         Time since midnight, or since 1970 if the text has a date [s]; None if the text is not a time.
     """
-    text = _ZONE.sub("", text.strip())
+    text = _COMPACT.sub(r"\1-\2-\3 \4:\5:\6", _ZONE.sub("", text.strip()))
+    text = _MONTH.sub(lambda month: str(_MONTHS[month[1].lower()]), text)
     date, days = _DATE.match(text), 0.0
     if date:
         first, second, third = (int(part) for part in date.groups())

@@ -22,7 +22,7 @@ from bushfit.errors import MeasurementError
 from bushfit.reading.blocks import find_segments
 from bushfit.reading.headers import COUNTED, AmplitudeConvention, Vocabulary, split_convention
 from bushfit.reading.layout import Layout
-from bushfit.reading.lines import Line, is_comment, is_row, is_summary_row
+from bushfit.reading.lines import Line, is_comment, is_row, is_summary_row, is_units_row
 from bushfit.reading.numerals import is_like_number, plainest_value
 from bushfit.reading.roles import CONDITIONS
 from bushfit.reading.source import RowSource, Sheet, cells_of
@@ -33,7 +33,7 @@ _STEPPED = ("frequency", "amplitude")
 _MOST_HEADER_ROWS = 4
 #: Number in a header, with its symbol ("A = 0.1") and the word after it, which may be its unit.
 _LEVEL = re.compile(
-    r"(?:(?P<name>[^\W\d_]+)\s*=\s*)?(?<![\w.,*'|])±?(?P<number>\d+(?:[.,]\d+)?(?:e[+-]?\d+)?)(?![.,]?\d)"
+    r"(?:(?P<name>[^\W\d_]+)\s*=\s*)?(?<![\w.,*'|#])±?(?P<number>\d+(?:[.,]\d+)?(?:e[+-]?\d+)?)(?![.,]?\d)"
     r"(?:\s*[\[(]?\s*(?P<unit>[^\W\d_]+|%|°(?!\s*[CFK]))[\])]?)?",
     re.IGNORECASE,
 )
@@ -125,6 +125,9 @@ def unpivot(source: RowSource, layout: Layout, file: Path, vocabulary: Vocabular
         headers = [list(map(str, line.content)) for line in above[-_MOST_HEADER_ROWS:]]
         if not (rows and headers):
             continue
+        if len(headers) > 1 and is_units_row(headers[-1]):  # the unit of an amplitude may be that of a stiffness
+            named = zip(headers[-2], headers.pop(), strict=True)
+            headers[-1] = [f"{name} [{unit}]" if name and unit else name or unit for name, unit in named]
         corners = [[m.stepped for m in _read_corner(cell, vocabulary) if not m.level] for cell in headers[-1]]
         start = first_number(rows[0]) or 0
         repeated = [n for n in range(start + 1, width) if any(corners[n]) and corners[n] == corners[start]]
@@ -156,14 +159,14 @@ def _read_block(headers: Sequence[list[str]], rows: Sequence[Line], vocabulary: 
     meanings = dict.fromkeys(columns, _Meaning())
     down, across = _Meaning(), _Meaning()
     for distance, cells in enumerate(reversed(headers)):
-        merged: Iterator[str] = accumulate(cells, lambda before, cell: cell or before)
-        texts = list(merged) if distance else cells
+        texts = _merged(cells) if distance else cells
         row = {column: _read_header(texts[column], vocabulary) for column in columns}
         levels = {meaning.stepped for meaning in row.values() if meaning.level}
         unclear = [column for column in columns if texts[column] and row[column] == _Meaning()]
         corners = _read_corner(cells[0], vocabulary)
         is_name = cells[0] != "" and not is_like_number(cells[0])
-        if is_name and levels == {None} and not any(corner.stepped or corner.unit for corner in corners):
+        is_value = levels == {None} and not any(corner.stepped or corner.unit for corner in corners)
+        if is_name and (is_value or (distance and sum(map(bool, cells)) == 2)):
             break  # a name and its value above the table
         if unclear and not (levels and all(is_summary_row([texts[column]]) for column in unclear)):
             break
@@ -182,16 +185,23 @@ def _read_block(headers: Sequence[list[str]], rows: Sequence[Line], vocabulary: 
     meanings = {n: meanings[n] | across | _Meaning(stepped=stepped) for n in columns}
     if stepped is None or len(columns) < 2 or not all(meaning.level for meaning in meanings.values()):
         return []
-    names: dict[_Meaning, set[str]] = {}
+    names: dict[_Meaning, set[tuple[str, ...]]] = {}
+    all_texts = list(map(_merged, headers))
     for column, meaning in meanings.items():
-        names.setdefault(meaning, set()).add(headers[-1][column])
+        names.setdefault(meaning, set()).add(tuple(texts[column] for texts in all_texts))
     if any(len(texts) > 1 for texts in names.values()):
-        return []  # such as K axial and K radial, at the same level
+        return []  # such as K axial and K radial, or two samples, at the same level
     down = replace(down, stepped=_STEPPED[stepped == _STEPPED[0]])
     return [
         _WideColumn(meaning, down, [(row.number, row.content[0], row.content[n]) for row in rows])
         for n, meaning in meanings.items()
     ]
+
+
+def _merged(cells: Sequence[str]) -> list[str]:
+    """Cells of a row of headers, of which the empty ones repeat the cell on their left."""
+    merged: Iterator[str] = accumulate(cells, lambda before, cell: cell or before)
+    return list(merged)
 
 
 def _read_corner(text: str, vocabulary: Vocabulary) -> list[_Meaning]:

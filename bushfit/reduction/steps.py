@@ -16,6 +16,7 @@ from bushfit.errors import MeasurementError
 from bushfit.geometry import Place
 from bushfit.progress import track
 from bushfit.reading.measurement import Complex, Floats, Loop
+from bushfit.reduction.arrays import median_and_scatter
 from bushfit.reduction.cycles import (
     Cycles,
     keeps_changing,
@@ -37,6 +38,8 @@ _SETTLING_FREQUENCY = 0.01
 _LEVEL_GAP = 0.1
 #: Largest relative distance of a step from its stated level; chosen: rigs miss a level by less.
 _LEVEL_REACH = 0.3
+#: Smallest robust standard deviation of a motion that does not rest, relative to its amplitude; chosen: a sine has 1.
+_LEAST_MOTION = 0.5
 #: Reason why a stretch whose frequency or amplitude is not steady gives no point.
 _CHANGING = "the frequency or amplitude changes all the time"
 
@@ -130,16 +133,17 @@ def find_steps(history: Loop, fewest: int) -> tuple[list[Step], list[SkippedStre
                 found.append((start, end, step))
                 continue
             skipped.append(SkippedStretch(history.name, start, end, why, count >= fewest))
-    return join_broken_steps(found), skipped
+    return join_broken_steps(history, found), skipped
 
 
-def join_broken_steps(timed_steps: Sequence[tuple[float, float, Step]]) -> list[Step]:
+def join_broken_steps(history: Loop, timed_steps: Sequence[tuple[float, float, Step]]) -> list[Step]:
     """Merge steps that are parts of one interrupted step: the longest part remains.
 
-    An outlier or a creeping amplitude splits a step; its sine resumes in phase after a cycle or two. The frequencies of
-    the parts may differ by up to 1 % if one part is much shorter, else by 0.2 %.
+    An outlier or a creeping amplitude splits a step; its sine resumes in phase after a cycle or two, without a rest.
+    The frequencies of the parts may differ by up to 1 % if one part is much shorter, else by 0.2 %.
 
     Args:
+        history: record of the steps.
         timed_steps: beginning [s] and end [s] of the cycles of each step, and the step, in order of time.
 
     Returns:
@@ -152,7 +156,9 @@ def join_broken_steps(timed_steps: Sequence[tuple[float, float, Step]]) -> list[
             before, (shorter, longer) = joined[-1], sorted((joined[-1].found, step.found))
             reach = _SETTLING_FREQUENCY if 2 * shorter < longer else _SAME_FREQUENCY
             is_same_frequency = abs(np.log(before.frequency / step.frequency)) < reach
-            if is_same_frequency and abs(np.log(before.amplitude / step.amplitude)) < _LEVEL_GAP:
+            between = history.displacement[slice(*np.searchsorted(history.time, (last_end, start)))]
+            rests = between.size > 0 and median_and_scatter(between)[1] < _LEAST_MOTION * step.amplitude
+            if is_same_frequency and not rests and abs(np.log(before.amplitude / step.amplitude)) < _LEVEL_GAP:
                 step = max(joined.pop(), step, key=lambda one: one.found)
         joined.append(step)
         last_end = end

@@ -162,3 +162,52 @@ def test_blocks_with_other_units_or_another_order_are_refused(first, second, wor
     done = typing(tmp_path)("inspect", "blocks.csv", "--direction", "axial", "--json", status=2)
     assert [word for word in words if word not in done.stderr] == []
     assert [path.name for path in tmp_path.iterdir()] == ["blocks.csv"]
+
+
+@pytest.mark.parametrize(
+    "variables",
+    [
+        {
+            "A": {
+                "data": np.column_stack([TIME, DISPLACEMENT, FORCE]),
+                "colheaders": ["t [s]", "Disp [mm]", "Force [N]"],
+            }
+        },
+        {"fs": 20.0, "disp_mm": DISPLACEMENT, "force_N": FORCE},
+        {
+            f"Signal_{number}": {
+                "x_values": {
+                    "start_value": 0.0,
+                    "increment": 0.05,
+                    "number_of_values": 600.0,
+                    "quantity": {"label": "s"},
+                },
+                "y_values": {"values": values, "quantity": {"label": unit}},
+                "function_record": {"name": name},
+            }
+            for number, (name, values, unit) in enumerate([("Point 1", DISPLACEMENT, "mm"), ("Point 2", FORCE, "N")])
+        },
+    ],
+    ids=["importdata", "scalar rate", "Testlab"],
+)
+def test_loops_in_structs_of_matlab(variables, tmp_path):
+    scipy.io.savemat(tmp_path / "loop.mat", variables)
+    (test,) = inspected(tmp_path, "loop.mat")[1]
+    check(test, LOOP)
+
+
+@pytest.mark.parametrize("in_matrix", [True, False])
+def test_levels_of_a_sweep_in_matlab(in_matrix, tmp_path):
+    """An amplitude for each column of a complex matrix, or one beside the vectors of each struct."""
+    frequency, stiffness = (
+        np.array([5.0, 10.0, 20.0]),
+        np.array([[1e6, 9e5], [1.1e6, 1e6], [1.2e6, 1.1e6]]) * (1 + 0.1j),
+    )
+    level = {"freq_Hz": frequency, "ampl_mm": np.array([0.1, 0.3]), "K_N_m": stiffness}
+    structs = [
+        {"freq_Hz": frequency, "K_N_m": np.abs(k), "phase_rad": np.angle(k), "ampl_mm": x}
+        for k, x in zip(stiffness.T, (0.1, 0.3), strict=True)
+    ]
+    scipy.io.savemat(tmp_path / "sweep.mat", level if in_matrix else {"test": structs})
+    for test, k, x in zip(inspected(tmp_path, "sweep.mat")[1], stiffness.T, (1e-4, 3e-4), strict=True):
+        check(test, {"frequency": frequency, "amplitude": np.full(3, x), "stiffness": k})
