@@ -6,7 +6,6 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from bushfit.diagnosis import document
-from bushfit.model.covariance import Z95
 from bushfit.model.result import End
 
 #: Value of the key `schema`, which names the layout of the file; a row with another layout is evaluated again.
@@ -43,17 +42,6 @@ class Estimate:
         """
         low, high, stderr = (x if x is not None and math.isfinite(x) else None for x in (low, high, stderr))
         return cls(value, low, high, stderr, unit)
-
-    @classmethod
-    def normal(cls, value: float, stderr: float, unit: str) -> "Estimate":
-        """Make an estimate with the 95 % interval of a normally distributed error.
-
-        Args:
-            value: the value, in `unit`.
-            stderr: standard error, in `unit`.
-            unit: SI unit.
-        """
-        return cls(value, value - Z95 * stderr, value + Z95 * stderr, stderr, unit)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

@@ -13,6 +13,7 @@ from bushfit.batch.document import Estimate
 from bushfit.effects import get_parameter, is_parameter, library_parameters
 from bushfit.errors import UnitError, did_you_mean
 from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Direction, Motion
+from bushfit.model.covariance import Z95
 from bushfit.reading.measurement import Sweep
 from bushfit.report.tables import spread_indices
 from bushfit.units import display_unit, is_compatible, parse_quantity
@@ -160,11 +161,12 @@ def measured_at(sweeps: Iterable[Sweep], point: Point, noise: float) -> dict[str
         near = np.abs(sweep.frequency / point.frequency - 1.0) <= _SAME_FREQUENCY
         near &= np.abs(sweep.amplitude / point.amplitude - 1.0) <= _SAME_AMPLITUDE
         if str(sweep.direction) == point.place and near.any():
-            mean, error = complex(sweep.stiffness[near].mean()), noise / near.sum() ** 0.5
+            mean, error = complex(sweep.stiffness[near].mean()), noise / float(near.sum()) ** 0.5
             stiffness, loss = abs(mean), mean.imag / mean.real
+            errors = (stiffness, stiffness * error, point.motion.stiffness_unit), (loss, (1.0 + loss**2) * error, "1")
             return {
-                f"{STIFFNESS} {point}": Estimate.normal(stiffness, stiffness * error, point.motion.stiffness_unit),
-                f"{LOSS_FACTOR} {point}": Estimate.normal(loss, (1.0 + loss**2) * error, "1"),
+                f"{name} {point}": Estimate(value, value - Z95 * stderr, value + Z95 * stderr, stderr, unit)
+                for name, (value, stderr, unit) in zip((STIFFNESS, LOSS_FACTOR), errors, strict=True)
             }
     return {}
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from bushfit.caveat import to_caveats
+from bushfit.caveat import Caveat, to_caveats
 from bushfit.cli.options import FILE, command_called, flag, option, option_group
 from bushfit.cli.output import Output, with_output
 from bushfit.cli.shared_options import prediction_options, quantity, static_rate_option
@@ -99,11 +99,11 @@ def command(model: Path, formats: tuple[str, ...], campaign: Path | None, output
     grid: Any = {key: settings.pop(key) for key in GridOptions.__annotations__}
     document, files = export(result, model_source(file), names, loaded, grid, **settings)
     folder = output.folder((loaded or result).name, *(part.name for part in files))
-    limits = dict[str, list[str]]()
+    limits = dict[Caveat, list[str]]()
     for name, entry in document["formats"].items():
-        for omission in entry["left_out"]:
-            limits.setdefault(omission, []).append(name)
-    printed = [*limits] if output.verbose else [limit for limit in limits if "error" in limit]
+        for limit in to_caveats(entry["left_out"], entry["left_out_kinds"]):
+            limits.setdefault(limit, []).append(name)
+    printed = [limit for limit in limits if output.verbose or limit.kind == "format_error"]
     for limit in printed:
         output.print(f"limit of {', '.join(limits[limit])}: {limit}")
     if remaining := len(limits) - len(printed):

@@ -14,7 +14,6 @@ from bushfit.commands.provenance import campaign_document, option_words, result_
 from bushfit.commands.respond import validation_files
 from bushfit.diagnosis import workflow
 from bushfit.diagnosis.document import DiagnosisFile
-from bushfit.diagnosis.next_test import MEASURE_AGAIN
 from bushfit.diagnosis.record import Diagnosis, DiagnosisSettings, level_of
 from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.errors import FitError, quote_path
@@ -67,7 +66,7 @@ class DiagnosisOutput:
         It is not useful without a named cause, if the named effects are certain and in the model already, or if a part
         of the tests has to be measured again first.
         """
-        if self.diagnosis.next_test.startswith(MEASURE_AGAIN):
+        if self.diagnosis.measure_again:
             return ""
         causes = [entry for entry in self.diagnosis.effects if entry.name != UNNAMED]
         if self.diagnosis.verdict == "named" and not any(level_of(e.name) in ("record", "unresolved") for e in causes):
@@ -117,11 +116,12 @@ def diagnose(
     numbers = {"max_effects": max_effects, "tolerance": tolerance}
     changed = {key: f"{number:g}" for key, number in numbers.items() if number != getattr(DiagnosisSettings, key)}
     options = option_words(model="MODEL.json" if start else None, adopt=adopt, without=without, **changed)
-    path = _printed_path(data.campaign)
-    command = " ".join(["bushfit diagnose", path, *options])
+    path = data.campaign.path
+    printed_path = quote_path(Path(path.name) if path.is_absolute() else path)  # results hold no machine's paths
+    command = " ".join(["bushfit diagnose", printed_path, *options])
     diagnosis = workflow.diagnose(data, start.model if start else None, settings)
-    if data.campaign.path.suffix == ".toml":
-        diagnosis = _with_commands(diagnosis, path, command, can_plan=not (start or adopt))
+    if path.suffix == ".toml":
+        diagnosis = _with_commands(diagnosis, printed_path, command, can_plan=not (start or adopt))
     if not (diagnosis.changed or start or adopt):  # the model to use is that of fit
         plain = (joint or fit(data)).result
         warnings = (replace(warning, text=warning.text.removesuffix(NEXT)) for warning in plain.warnings)
@@ -175,11 +175,6 @@ def _require_free_parameter(data: PreparedCampaign, model: Model | None, setting
             found="every parameter is fixed by vary = false",
             hint="bushfit fit shows how well the given values meet the tests; to diagnose, free a parameter",
         )
-
-
-def _printed_path(campaign: Campaign) -> str:
-    """Path of a campaign in a printed command; only its name if it is absolute, as results hold no machine's paths."""
-    return quote_path(Path(campaign.path.name) if campaign.path.is_absolute() else campaign.path)
 
 
 def _with_commands(diagnosis: Diagnosis, path: str, command: str, *, can_plan: bool) -> Diagnosis:

@@ -37,10 +37,12 @@ class FormatEntry(TypedDict):
     Args:
         files: names of the files of the format.
         left_out: properties of the model that the format cannot represent, with the error that this causes.
+        left_out_kinds: for each property, format_error if its sentence states this error, else format_omission.
     """
 
     files: list[str]
     left_out: list[str]
+    left_out_kinds: list[str]
 
 
 class ExportDocument(WarningEntries):
@@ -87,7 +89,11 @@ def export(
         exported[name] = getattr(importlib.import_module(f"bushfit.{module}"), function)(request)
     document: ExportDocument = {
         "formats": {
-            name: {"files": list(written.files), "left_out": list(written.omissions)}
+            name: {
+                "files": list(written.files),
+                "left_out": [omission.text for omission in written.omissions],
+                "left_out_kinds": [omission.kind for omission in written.omissions],
+            }
             for name, written in exported.items()
         },
         **to_entries(predicted.warnings),

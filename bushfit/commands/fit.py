@@ -76,7 +76,7 @@ def fit(
     files = [ResultFile("model", "json", document), *campaign_files(data, result)]
     if len({place.body for place in result.fitted_places if place.axis and place.body}) > 1:
         predicted = partial(predict_each_bushing, data, names, directions or None)
-        files.append(ResultFile("bushings", "table", lambda: tables.bushings_table(predicted())))
+        files.append(ResultFile("bushings", "table", predicted))
     return FitOutput(data, (("joint fit", result),), document, files)
 
 

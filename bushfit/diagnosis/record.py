@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -28,6 +28,9 @@ from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.prediction.caveats import warnings_of
 from bushfit.validation import to_json_data
+
+if TYPE_CHECKING:
+    from bushfit.diagnosis.verdict import Composition
 
 #: Probability above which no further digits are shown.
 _NEARLY_ONE = 0.995
@@ -94,7 +97,7 @@ class NamedCause:
 
     name: str
     evidence: str
-    alternatives: tuple[str, ...] = ()
+    alternatives: "tuple[Composition, ...]" = ()
     test: str | None = None
     sentence: str = ""
     correction: str = ""
@@ -188,6 +191,7 @@ class Diagnosis:
         notes: further warnings.
         description: power law of a gap that no known effect explains; None without such a gap or law.
         odds: reported explanations with their probabilities.
+        measure_again: True if a part of the tests has to be measured again first, as `next_test` states.
     """
 
     verdict: Verdict
@@ -204,6 +208,7 @@ class Diagnosis:
     notes: tuple[Caveat, ...] = ()
     description: Description | None = None
     odds: Odds = Odds(1.0)
+    measure_again: bool = False
 
     @property
     def changed(self) -> bool:
@@ -289,7 +294,7 @@ class Diagnosis:
             "correction": named.correction or None,
             "parameters": parameters,
             "evidence": named.evidence,
-            "alternatives": list(named.alternatives),
+            "alternatives": [composition.label for composition in named.alternatives],
         }
 
 

@@ -237,7 +237,7 @@ class DiagnosisWriter:
         rest = "the rest of the gap" if self.finding.names else "the gap"
         sentences = [undecided_text(reported)]
         sentences += [f"a smooth correction closes {rest}: {gap.sentence}"] if gap else []
-        others = tuple(composition.label for composition in reported if composition is not leader)
+        others = tuple(composition for composition in reported if composition is not leader)
         entries = self._record_entries(leader, others)
         if not entries:
             why = probability_text(leader, self.finding)
@@ -267,7 +267,7 @@ class DiagnosisWriter:
             advice = _LEVELS_ADVICE
         else:
             sentences = ["no known effect closes the gap", *causes_text(candidates, self.finding)]
-        entries = [NamedCause(UNNAMED, gap.evidence, tuple(c.label for c in candidates))] if gap else []
+        entries = [NamedCause(UNNAMED, gap.evidence, tuple(candidates))] if gap else []
         places = None if gap else first.best
         verdict: Verdict = "described" if gap else "unexplained"
         return self._build(closing, "; ".join(sentences), entries, verdict=verdict, places=places, next_test=advice)
@@ -295,12 +295,12 @@ class DiagnosisWriter:
         advice = deciding_test(models, odds, self.search.base.data_sets, self.search.data.campaign.rig)
         return advice or (get_effect(leader.names[0]).confirmed_by if leader.names else "")
 
-    def _record_entries(self, composition: Composition, alternatives: tuple[str, ...] = ()) -> list[NamedCause]:
+    def _record_entries(self, composition: Composition, alternatives: tuple[Composition, ...] = ()) -> list[NamedCause]:
         """List the entries on the recording mistake of an explanation, one per affected test; none without a mistake.
 
         Args:
             composition: the explanation.
-            alternatives: names of explanations that the tests cannot distinguish from this one.
+            alternatives: explanations that the tests cannot distinguish from this one.
         """
         if (claim := composition.best.claim) is None:
             return []
@@ -381,6 +381,7 @@ class DiagnosisWriter:
             tuple(self._notes()),
             gap.description if gap else None,
             odds,
+            measure_again=bool(faulty_parts),
         )
 
     def _notes(self) -> list[Caveat]:

@@ -52,10 +52,15 @@ class Composition:
         return () if is_pattern(self.best.faulty_parts) else self.best.faulty_parts
 
     @property
-    def label(self) -> str:
-        """Names of the mistake (as --adopt accepts it), effects, faults and nameless parts, joined by +."""
+    def labels(self) -> tuple[str, ...]:
+        """Names of the mistake (as --adopt accepts it), effects, faults and nameless parts."""
         claim, faults = self.best.claim, (f"fault: {part.name}" for part in self.faulty_parts)
-        return " + ".join((*(claim.labels if claim else ()), *self.names, *faults, *self.nameless))
+        return (*(claim.labels if claim else ()), *self.names, *faults, *self.nameless)
+
+    @property
+    def label(self) -> str:
+        """Names of all parts, joined by +."""
+        return " + ".join(self.labels)
 
     @property
     def nameless(self) -> tuple[str, ...]:

@@ -16,6 +16,7 @@ from functools import partial
 
 import numpy as np
 
+from bushfit.caveat import Caveat
 from bushfit.effects import Level as EffectLevel
 from bushfit.export.contract import MM_T_S_N, Exported, ExportRequest, UnitSystem
 from bushfit.export.deck import (
@@ -53,11 +54,11 @@ def export(request: ExportRequest) -> Exported:
     omissions = tuple(table_omissions(request, _FORM))
     series = prony_series(request) if request.time_domain else []
     if has_material := LONG_TERM in request.result.model.values:
-        omissions += ("compound: the material has one strain amplitude everywhere, which its table states",)
+        sentence = "compound: the material has one strain amplitude everywhere, which its table states"
     else:
-        omissions += ("compound: no elastic branch, so no long-term modulus, and no material",)
+        sentence = "compound: no elastic branch, so no long-term modulus, and no material"
     usage = "behaviors are for CONN3D2 of type BUSHING; they act in *STEADY STATE DYNAMICS, DIRECT"
-    omissions += tuple(prony_omissions(series)) if series else ()
+    omissions += (Caveat("format_omission", sentence), *(prony_omissions(series) if series else ()))
     lines = deck_lines(request, "**", units, omissions, usage, "BUSHING_", partial(_behavior, units))
     return Exported(
         {"bushing.inp": encode_deck([*lines, *(_materials(request, units, series) if has_material else ())])}, omissions

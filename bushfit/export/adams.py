@@ -11,11 +11,13 @@ Altair TeimOrbit format and AutoBush, which reads the same files.
 """
 
 from collections.abc import Mapping, Sequence
+from itertools import chain
 from pathlib import Path
 from typing import Literal, NamedTuple
 
 import numpy as np
 
+from bushfit.caveat import Caveat
 from bushfit.export.contract import Exported, ExportRequest
 from bushfit.export.deck import (
     CARDANIC,
@@ -71,8 +73,8 @@ class _Element(NamedTuple):
     frequency: float
     damping: Mapping[Kind, float]
 
-    def describe_error(self, kind: Kind) -> str:
-        """Sentence on the errors of |K| and loss factor that a single static curve and damping cause over the grid.
+    def error(self, kind: Kind) -> Caveat:
+        """Describe the errors of |K| and loss factor that a single static curve and damping cause over the grid.
 
         Args:
             kind: "car" for Adams Car, "ride" for Adams Car Ride.
@@ -87,9 +89,10 @@ class _Element(NamedTuple):
             exact.append(table.stiffness)
         element, model = np.concatenate(written), np.concatenate(exact)
         loss = number(float(np.max(np.abs(loss_factor(element) - loss_factor(model)))), 2)
-        return (
+        return Caveat(
+            "format_error",
             f"{self.reference.direction}, {kind}: a static curve, with the damping at {number(self.frequency, 4)} Hz: "
-            f"the error of |K| is {format_deviation(np.abs(element / model))}, of the loss factor up to {loss}"
+            f"the error of |K| is {format_deviation(np.abs(element / model))}, of the loss factor up to {loss}",
         )
 
 
@@ -115,28 +118,29 @@ def export(request: ExportRequest) -> Exported:
         frequency, exact = float(frequencies[row]), complex(reference.stiffness[row])
         damping: dict[Kind, float] = {"car": exact.imag / (2.0 * np.pi * frequency), "ride": float(np.angle(exact))}
         elements.append(_Element(tables, curve, reference, frequency, damping))
-    shared = [line for prediction in predictions for line in band_omissions(prediction)] + list(
-        common_omissions(request)
-    )
+    shared = [*chain.from_iterable(map(band_omissions, predictions)), *common_omissions(request)]
     if request.units:
-        shared.append(
+        sentence = (
             f"the requested units ({request.units}) are not used: the file states its units, which Adams converts"
         )
-    omissions = {kind: [element.describe_error(kind) for element in elements] for kind in _KINDS}
+        shared.append(Caveat("format_omission", sentence))
+    omissions = {kind: [element.error(kind) for element in elements] for kind in _KINDS}
     files = {
         f"bushing_{kind}.bus": _property_file(request, elements, kind, [*omissions[kind], *shared]) for kind in _KINDS
     }
     return Exported(files, (*omissions["car"], *omissions["ride"], *shared))
 
 
-def _property_file(request: ExportRequest, elements: Sequence[_Element], kind: Kind, omissions: Sequence[str]) -> bytes:
+def _property_file(
+    request: ExportRequest, elements: Sequence[_Element], kind: Kind, omissions: Sequence[Caveat]
+) -> bytes:
     """Write a property file for Adams Car or Adams Car Ride.
 
     Args:
         request: model, predictions and settings.
         elements: element of each direction.
         kind: "car" for Adams Car, "ride" for Adams Car Ride.
-        omissions: sentences on properties that the format cannot represent.
+        omissions: properties that the format cannot represent.
 
     Returns:
         Content of the file.

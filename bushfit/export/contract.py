@@ -10,6 +10,7 @@ from typing import Literal
 
 import numpy as np
 
+from bushfit.caveat import Caveat
 from bushfit.effects.contract import RubberConditions
 from bushfit.effects.temperature import REFERENCE
 from bushfit.errors import UnitError
@@ -133,7 +134,7 @@ class ExportRequest:
     cardanic: complex | None = None
     day: str | None = None
 
-    def remarks(self, omissions: Iterable[str]) -> Iterator[tuple[str, str]]:
+    def remarks(self, omissions: Iterable[Caveat]) -> Iterator[tuple[str, str]]:
         """Generate the notes for the head of an exported file.
 
         Args:
@@ -167,7 +168,7 @@ class ExportRequest:
                 parts.append(format_range("degC", *temperatures) if temperatures else "temperature not stated")
                 parts.append("fitted" if fitted else "not fitted")
                 yield "valid", ", ".join(parts)
-        yield from (("limit", omission) for omission in omissions)
+        yield from (("limit", omission.text) for omission in omissions)
         warnings = warnings_of(self.result, [prediction.warnings for prediction in self.predictions])
         yield from (("warning", warning.text) for warning in warnings)
 
@@ -188,10 +189,11 @@ class Exported:
 
     Args:
         files: content by file name.
-        omissions: sentences on properties that the format cannot represent, with the error that this causes.
+        omissions: properties that the format cannot represent: of the kind "format_error" if the sentence states the
+            error that this causes, else "format_omission".
         arms: groups of Maxwell arms in the files; empty if the format has none.
     """
 
     files: Mapping[str, bytes]
-    omissions: tuple[str, ...] = ()
+    omissions: tuple[Caveat, ...] = ()
     arms: tuple[Arms, ...] = ()

@@ -3,10 +3,12 @@
 import re
 import textwrap
 from collections.abc import Callable, Iterable, Iterator
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
+from bushfit.caveat import Caveat
 from bushfit.effects import Level as EffectLevel
 from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
@@ -25,8 +27,8 @@ _UNPRINTABLE = re.compile(r"[^\x20-\x7e]")
 DOFS = {Direction.AXIAL: (3,), Direction.RADIAL: (1, 2), Direction.TORSION: (6,)}
 #: Degrees of freedom without a law: the rotations about x and y.
 CARDANIC = (4, 5)
-#: Sentence on the loss of every format with stiffness over frequency.
-NO_LOOPS = "no law in time: for loops, overtones and transients, use the format fmu"
+#: Limit of every format with stiffness over frequency.
+NO_LOOPS = Caveat("format_omission", "no law in time: for loops, overtones and transients, use the format fmu")
 
 
 class StiffnessTable(NamedTuple):
@@ -152,7 +154,7 @@ def comment_lines(mark: str, lines: Iterable[str]) -> list[str]:
     return wrapped
 
 
-def heading(request: ExportRequest, units: str, omissions: Iterable[str]) -> list[str]:
+def heading(request: ExportRequest, units: str, omissions: Iterable[Caveat]) -> list[str]:
     """List the comments at the head of a deck: bushing, model and its hash, units, axes, omissions and warnings.
 
     Args:
@@ -182,7 +184,7 @@ def deck_lines(
     request: ExportRequest,
     mark: str,
     units: UnitSystem,
-    omissions: Iterable[str],
+    omissions: Iterable[Caveat],
     usage: str,
     name: str,
     level_lines: Callable[[int, AmplitudeLevel], Iterable[str]],
@@ -193,7 +195,7 @@ def deck_lines(
         request: model and settings.
         mark: comment sign at the start of a comment line.
         units: unit system of the deck.
-        omissions: sentences on properties that the deck cannot represent.
+        omissions: properties that the deck cannot represent.
         usage: comment on the use of the deck in the solver.
         name: prefix of the names of the levels, before their rank.
         level_lines: function of the rank of a level, from 1, and the level that returns its lines.
@@ -222,15 +224,15 @@ def encode_deck(lines: Iterable[str]) -> bytes:
     return ("\n".join(lines) + "\n").encode("ascii")
 
 
-def table_omissions(request: ExportRequest, form: StiffnessForm) -> Iterator[str]:
-    """Generate sentences on the omissions of a deck with linear tables over frequency, one set for each amplitude.
+def table_omissions(request: ExportRequest, form: StiffnessForm) -> Iterator[Caveat]:
+    """Generate the omissions of a deck with linear tables over frequency, one set for each amplitude.
 
     Args:
         request: model, predictions and settings.
         form: conversion of the complex stiffness to the quantities that the solver interpolates.
 
-    Returns:
-        Iterator over sentences with the errors of |K|; sentences on a single direction come first.
+    Yields:
+        Omissions with the errors of |K|; those of a single direction come first.
     """
     model = request.result.model.without(EffectLevel.INSTRUMENT)
     for prediction in exported_directions(request):
@@ -240,10 +242,11 @@ def table_omissions(request: ExportRequest, form: StiffnessForm) -> Iterator[str
             ratios = np.concatenate([np.abs(reference.stiffness / table.stiffness) for table in tables])
             unit, factor = place.display.displacement
             low, value, high = (number(table.amplitude * factor, 4) for table in (tables[0], reference, tables[-1]))
-            yield (
-                f"{place}: each property has one amplitude. The property of {value} {unit} has errors of "
-                f"{format_deviation(ratios)} in |K| at {low} to {high} {unit}"
-            )
+            yield Caveat(
+                "format_error",
+                f"each property has one amplitude. The property of {value} {unit} has errors of "
+                f"{format_deviation(ratios)} in |K| at {low} to {high} {unit}",
+            ).about(place)
         if tables[0].frequency.size > 1:
             worst = 0.0
             for table in tables:  # linear interpolation halfway between two frequencies
@@ -251,21 +254,20 @@ def table_omissions(request: ExportRequest, form: StiffnessForm) -> Iterator[str
                 lines = (0.5 * (part[1:] + part[:-1]) for part in form.parts(table.frequency, table.stiffness))
                 exact = model.stiffness(place, halfway, table.amplitude, conditions=request.conditions)
                 worst = max(worst, float(np.max(np.abs(form.joined(halfway, *lines) / exact - 1.0))))
-            yield f"{place}: interpolated between the frequencies, |K| has errors of up to {number(100.0 * worst, 2)} %"
+            sentence = f"interpolated between the frequencies, |K| has errors of up to {number(100.0 * worst, 2)} %"
+            yield Caveat("format_error", sentence).about(place)
         else:
-            yield f"{place}: one frequency, {number(tables[0].frequency[0], 4)} Hz: K and loss are constants"
+            sentence = f"one frequency, {number(tables[0].frequency[0], 4)} Hz: K and loss are constants"
+            yield Caveat("format_omission", sentence).about(place)
         yield from band_omissions(prediction)
     yield from common_omissions(request)
 
 
-def common_omissions(request: ExportRequest) -> Iterator[str]:
-    """Generate sentences on the omissions of every deck: time domain, coupling, and motions that the model lacks.
-
-    Returns:
-        Iterator over sentences.
-    """
+def common_omissions(request: ExportRequest) -> Iterator[Caveat]:
+    """Generate the omissions of every deck: time domain, coupling, and motions that the model lacks."""
     yield NO_LOOPS
-    yield "coupling between directions is not included"
+    omit = partial(Caveat, "format_omission")
+    yield omit("coupling between directions is not included")
     present = {prediction.direction for prediction in exported_directions(request)}
     missing = [str(direction) for direction in DOFS if direction not in present]
     if request.cardanic is None:
@@ -273,18 +275,20 @@ def common_omissions(request: ExportRequest) -> Iterator[str]:
     else:
         stiffness, loss = request.cardanic.real, request.cardanic.imag / request.cardanic.real
         constant = f"{number(stiffness, 5)} N m/rad, loss factor {number(loss, 3)}"
-        yield f"rotations about x and y: the stated constant, {constant}, which no test supports"
+        yield omit(f"rotations about x and y: the stated constant, {constant}, which no test supports")
     if missing:
-        yield f"no stiffness in {', '.join(missing)}"
+        yield omit(f"no stiffness in {', '.join(missing)}")
     if specimens := [str(place) for place in request.places if not place.axis]:
-        yield f"specimens: {', '.join(specimens)}"
+        yield omit(f"specimens: {', '.join(specimens)}")
 
 
-def band_omissions(prediction: Prediction) -> Iterator[str]:
-    """Generate sentences on the omitted 95 % band, and on |K| if an unresolved effect belongs to the rig."""
+def band_omissions(prediction: Prediction) -> Iterator[Caveat]:
+    """Generate the omission of the 95 % band, and on |K| if an unresolved effect belongs to the rig."""
     place, band = prediction.direction, prediction.stiffness
     if (width := float(np.max((band.high - band.low) / (2.0 * band.value)))) > 0.0:
-        yield f"{place}: the 95 % band of up to +/-{number(100.0 * width, 2)} % of |K| is left out"
+        sentence = f"the 95 % band of up to +/-{number(100.0 * width, 2)} % of |K| is left out"
+        yield Caveat("format_omission", sentence).about(place)
     if prediction.if_in_rig:
         deviation = format_deviation(prediction.if_in_rig.stiffness.value / band.value)
-        yield f"{place}: if the unresolved effect belongs to the rig, |K| is {deviation}; these values are left out"
+        sentence = f"if the unresolved effect belongs to the rig, |K| is {deviation}; these values are left out"
+        yield Caveat("format_omission", sentence).about(place)

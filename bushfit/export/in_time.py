@@ -1,12 +1,13 @@
 """A model in the time domain: lists of values, directions and Maxwell arms, as the C sources of an FMU read them."""
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from bushfit.caveat import Caveat
 from bushfit.effects import Branch, Effect, Level, Modifier, place_suffix, qualified_name
 from bushfit.effects.contract import RubberConditions
 from bushfit.effects.unnamed import NAME as UNNAMED
@@ -62,7 +63,7 @@ class TimeModel:
         arms: groups of arms with the effects that they replace, and their error.
         arm_rows: for each arm, index of its group in `arms`, its modulus over the model parameter that scales the
             group (`Arms.size`), and its relaxation time [s].
-        omissions: sentences on effects that are omitted or constant, with the error that this causes.
+        omissions: effects that are omitted or constant, with the error that this causes.
     """
 
     places: tuple[Place, ...]
@@ -71,7 +72,7 @@ class TimeModel:
     levers: tuple[float, ...]
     arms: tuple[Arms, ...]
     arm_rows: tuple[tuple[int, float, float], ...]
-    omissions: tuple[str, ...]
+    omissions: tuple[Caveat, ...]
 
 
 def time_model(request: ExportRequest) -> TimeModel:
@@ -104,7 +105,7 @@ def time_model(request: ExportRequest) -> TimeModel:
     band = float(frequencies.min()) / 100.0, float(frequencies.max()) * 10.0
     arms = model_arms(model, band, request.accuracy, conditions)
     values, names = _values(request, model, arms)
-    omissions = [f"{part.sentence}; slower relaxation is left out" for part in arms]
+    omissions = [Caveat("format_error", f"{part.sentence}; slower relaxation is left out") for part in arms]
     for prediction in request.predictions:
         omissions += [*_steady_omissions(model, omitted, prediction, conditions), *band_omissions(prediction)]
     sizes = values_under(model, conditions)
@@ -207,8 +208,8 @@ def _fields(model: Model, place: Place, names: Mapping[str, str], arms: tuple[Ar
 
 def _steady_omissions(
     model: Model, omitted: list[str], prediction: Prediction, conditions: RubberConditions
-) -> list[str]:
-    """Sentence on the error of |K| in an FMU in which effects are omitted or kept constant; none without an error.
+) -> Iterator[Caveat]:
+    """Generate the error of |K| in an FMU in which effects are omitted or kept constant; nothing without an error.
 
     Args:
         model: model in the export, without effects of the rig.
@@ -218,16 +219,17 @@ def _steady_omissions(
     """
     fixed = model.constant_modifiers
     if not (fixed or omitted):
-        return []
+        return
     place, (frequency, amplitude) = prediction.direction, middle_point(prediction)
     plain, values = model.without(*fixed), model.values_at(place, frequency, amplitude)
     written = plain.with_values({name: values[name] for name in plain.values})
     stiffness = written.stiffness(place, prediction.frequency, prediction.amplitude, conditions=conditions)
     error = float(np.max(np.abs(stiffness / prediction.complex_stiffness - 1.0)))
     if error < 1e-6 and not omitted:  # rounding
-        return []
+        return
     unit, factor = place.display.displacement
     point = f"{number(frequency, 3)} Hz and {number(factor * amplitude, 3)} {unit}"
     parts = [f"{', '.join(fixed)}, fixed as at {point}" if fixed else "", ", ".join(omitted)]
     effects = "; ".join(filter(None, parts))
-    return [f"{place}: {effects}: error of the stiffness up to {number(100.0 * error, 2)} % over the grid"]
+    sentence = f"{effects}: error of the stiffness up to {number(100.0 * error, 2)} % over the grid"
+    yield Caveat("format_error", sentence).about(place)

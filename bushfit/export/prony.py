@@ -6,13 +6,14 @@ G_0 = G_inf + sum_i G_i. All terms are positive, and the g_i sum to less than 1.
 Source: Abaqus Analysis User's Guide, "Time domain viscoelasticity": g_R(t) = 1 - sum_i g_i (1 - exp(-t/tau_i)).
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 import pandas as pd
 
+from bushfit.caveat import Caveat
 from bushfit.effects import Level
 from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
@@ -99,27 +100,26 @@ def prony_series(request: ExportRequest) -> list[PronySeries]:
     return series
 
 
-def prony_omissions(series: Sequence[PronySeries]) -> list[str]:
-    """Write sentences on the limits of Prony series: error, frequency band, and strain amplitude of each.
-
-    Returns:
-        Sentences with the relative errors in percent.
-    """
+def prony_omissions(series: Sequence[PronySeries]) -> Iterator[Caveat]:
+    """Generate the limits of Prony series: error, frequency band, and strain amplitude of each."""
     low, high = (number(end, 3) for end in series[0].arms.band)
     worst = number(100.0 * max(one.arms.error for one in series), 2)
-    sentences = [
+    yield Caveat(
+        "format_error",
         f"compound: the Prony series is valid only from {low} to {high} Hz, error up to {worst} % of the modulus; "
-        "positive terms cannot follow friction exactly"
-    ]
+        "positive terms cannot follow friction exactly",
+    )
     if len(series) > 1:
         middle = series[(len(series) - 1) // 2]
         ratios = np.concatenate([np.abs(middle.exact / one.exact) for one in series])
         strain, *ends = (number(100.0 * one.strain, 3) for one in (middle, series[0], series[-1]))
-        sentences.append(
+        yield Caveat(
+            "format_error",
             f"compound: each series has one strain amplitude. The series of {strain} % has errors of "
-            f"{format_deviation(ratios)} in |G| at {' to '.join(ends)} %"
+            f"{format_deviation(ratios)} in |G| at {' to '.join(ends)} %",
         )
-    return [*sentences, "compound: friction is a viscous loss at that amplitude, without a force at rest"]
+    sentence = "compound: friction is a viscous loss at that amplitude, without a force at rest"
+    yield Caveat("format_omission", sentence)
 
 
 def export(request: ExportRequest) -> Exported:

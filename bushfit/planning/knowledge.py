@@ -190,8 +190,9 @@ def undecided_effects(diagnosis: Diagnosis) -> list[tuple[str, ...]]:
     """
     sets, all_named = [], [effect.name for effect in diagnosis.effects]
     for effect in diagnosis.effects:
-        if effect.alternatives and not effect.test and not effect.alternatives[0].startswith("fault:"):
-            labels = [label.split(" + ") for label in effect.alternatives]
+        first, *_ = effect.alternatives or [None]
+        if first and not effect.test and (first.causes or not first.faulty_parts):
+            labels = [composition.labels for composition in effect.alternatives]
             explanations = [all_named if max(map(len, labels)) > 1 else [effect.name], *labels]
             names = [name for name in dict.fromkeys(chain(*explanations)) if name.partition(".")[0] in LIBRARY]
             sets.append(tuple(name for name in names if not all(name in effects for effects in explanations)))

@@ -65,7 +65,10 @@ def plan(knowledge: Knowledge, request: PlanRequest) -> Plan:
             hint="plan from the campaign, or for parameters or predictions",
         )
     search = PlanSearch.from_request(knowledge, request)
-    shorter = [search.with_hours(share * request.hours) for share in _SHARES.get(request.aim, ())]
+    budgets = [
+        replace(search.budget, maximum_minutes=60.0 * share * request.hours) for share in _SHARES.get(request.aim, ())
+    ]
+    shorter = [replace(search, budget=budget) for budget in budgets]
     for with_checks in (True, False) if search.goals else (False,):  # without checks only if no other plan reaches
         first = bisect_left(shorter, True, key=lambda search: search.reaches_aim(with_checks=with_checks))
         if first < len(shorter):

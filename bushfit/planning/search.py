@@ -102,10 +102,6 @@ class PlanSearch:
         goals = [replace(named[name], target=half_width) for name, half_width in request.targets.items()]
         return cls(knowledge, request, tests, effects, models, predictions, goals, Budget.from_tests(tests, request))
 
-    def with_hours(self, hours: float) -> PlanSearch:
-        """Copy of the search with another number of hours available on the rig."""
-        return replace(self, budget=replace(self.budget, maximum_minutes=60.0 * hours))
-
     @cached_property
     def counts(self) -> Array:
         """Best number of runs of each test, (tests,); all zero if no test fits into the hours.

@@ -44,42 +44,41 @@ def warnings_of(
     return list(dict.fromkeys((*notes, *result.warnings, *chain.from_iterable(predicted), *caveats(result))))
 
 
-def caveats(result: Result) -> list[Caveat]:
-    """List the warnings about a fitted result that apply to every prediction.
+def caveats(result: Result) -> Iterator[Caveat]:
+    """Generate the warnings about a fitted result that apply to every prediction.
 
     Args:
         result: fitted result.
 
-    Returns:
+    Yields:
         Warnings: unfitted directions, unresolved effects, and the limits of the model.
     """
-    warnings = [warning for place in result.fitted_places for warning in unfitted_warnings(result, place)]
+    for place in result.fitted_places:
+        yield from unfitted_warnings(result, place)
     for name in result.unresolved:
         twins = " or ".join(get_effect(name).twins)
         sentence = f"{name} is assigned to the bushing, but these tests cannot distinguish it from {twins}"
-        warnings.append(Caveat("effect_may_be_rig", sentence))
-    warnings += result.undecided
+        yield Caveat("effect_may_be_rig", sentence)
+    yield from result.undecided
     if "springpot" not in result.model.effects:
-        sentence = "the model has no springpot: its stiffness does not depend on frequency"
-        warnings.append(Caveat("no_springpot", sentence))
+        yield Caveat("no_springpot", "the model has no springpot: its stiffness does not depend on frequency")
     if unnamed := result.model.unnamed:
-        sentence = (
+        yield Caveat(
+            "correction_fades",
             "the unnamed correction follows the measurement, not a law. Outside the measured range, it fades "
-            f"and the band widens by up to +/-{number(100.0 * Z95 * unnamed.far_deviation, 2)} %"
+            f"and the band widens by up to +/-{number(100.0 * Z95 * unnamed.far_deviation, 2)} %",
         )
-        warnings.append(Caveat("correction_fades", sentence))
-        sentence = (
+        yield Caveat(
+            "correction_may_be_rig",
             "the unnamed correction is assigned to the bushing, but these tests cannot distinguish it "
             "from an effect of the rig. If it belongs to the rig, |K| of the bushing in the car differs by up to "
-            f"{number(100.0 * unnamed.largest, 2)} %"
+            f"{number(100.0 * unnamed.largest, 2)} %",
         )
-        warnings.append(Caveat("correction_may_be_rig", sentence))
     if result.measured is None:
-        warnings.append(Caveat("not_fitted", "the model was not fitted: it has no uncertainty and no fitted range"))
+        yield Caveat("not_fitted", "the model was not fitted: it has no uncertainty and no fitted range")
     if rig := rig_effects(result):
         sentence = "the prediction leaves out effects that belong to the rig and not to the bushing"
-        warnings.append(Caveat("rig_effects_excluded", f"{sentence}: {', '.join(rig)}"))
-    return warnings
+        yield Caveat("rig_effects_excluded", f"{sentence}: {', '.join(rig)}")
 
 
 def rig_effects(result: Result) -> list[str]:

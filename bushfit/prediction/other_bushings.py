@@ -1,9 +1,9 @@
 """Cross-validation of several bushings: predict each bushing by a fit to the others."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
+import pandas as pd
 
 from bushfit.effects import place_suffix
 from bushfit.effects.contract import Array
@@ -17,30 +17,9 @@ from bushfit.model.transfer import FACTOR_SPREAD, factor_spread, with_factor
 from bushfit.prediction.bands import uncertainty
 
 
-@dataclass(frozen=True)
-class OtherBushings:
-    """Misfit between the tests of one bushing and a model that was fitted to the other bushings.
-
-    Args:
-        bushing: name of the bushing.
-        points: number of operating points of its tests.
-        nrmse: root mean square error of the prediction, relative to |K|, or for a loop to half its force range.
-        reduced_chi_square: mean square error in units of noise.
-        gain: mean relative difference of |K|, measured minus predicted.
-        share_inside: share of the points whose |K| is in the 95 % band of prediction and noise, 0 to 1.
-    """
-
-    bushing: str
-    points: int
-    nrmse: float
-    reduced_chi_square: float
-    gain: float
-    share_inside: float
-
-
 def predict_each_bushing(
     data: PreparedCampaign, effects: Sequence[str], directions: Sequence[str] | None = None
-) -> list[OtherBushings]:
+) -> pd.DataFrame:
     """Cross-validate several bushings: predict the tests of each by a model that is fitted to the others.
 
     If the model has a free stiffness factor for each bushing, the band includes the spread of these factors.
@@ -51,12 +30,15 @@ def predict_each_bushing(
         directions: directions, specimens or bushings whose tests to use; see `PreparedCampaign.select_tests`.
 
     Returns:
-        Misfit of each bushing; empty for tests of fewer than two bushings.
+        A row per bushing; none for tests of fewer than two. Columns: name; number of operating points; root mean square
+        error of the prediction, relative to |K|, or for a loop to half its force range [%]; mean square error in units
+        of noise; mean relative difference of |K|, measured minus predicted [%]; and share of the points whose |K| is in
+        the 95 % band of prediction and noise [%].
     """
     tests = data.select_tests(directions)
     places = [test.direction for test in tests if isinstance(test.direction, Specimen) and test.direction.bushing]
     names = list(dict.fromkeys(place.body for place in places))
-    predicted = []
+    rows = []
     for name in names if len(names) > 1 else ():
         left_out = [test for test in tests if test.direction.body == name]
         fitted_places = list(dict.fromkeys(str(test.direction) for test in tests if test.direction.body != name))
@@ -67,17 +49,11 @@ def predict_each_bushing(
         if f"stiffness_factor.{name}" in effects:
             result = with_factor(result, [name], factor_spread(result) or FACTOR_SPREAD)
         points = [misfit.points for misfit in misfits]
-        predicted.append(
-            OtherBushings(
-                name,
-                sum(points),
-                float(np.sqrt(np.average([misfit.nrmse**2 for misfit in misfits], weights=points))),
-                float(np.average([misfit.reduced_chi_square for misfit in misfits], weights=points)),
-                float(np.average([misfit.gain for misfit in misfits], weights=points)),
-                float(np.mean(np.concatenate([_inside(result, test) for test in left_out]))),
-            )
-        )
-    return predicted
+        figures = [(misfit.nrmse**2, misfit.reduced_chi_square, misfit.gain) for misfit in misfits]
+        square, chi_square, gain = np.average(figures, axis=0, weights=points)
+        inside = np.concatenate([_inside(result, test) for test in left_out]).mean()
+        rows.append((name, sum(points), 100.0 * np.sqrt(square), chi_square, 100.0 * gain, 100.0 * inside))
+    return pd.DataFrame(rows, columns=["bushing", "points", "NRMSE [%]", "chi2 [-]", "mean gap [%]", "in band [%]"])
 
 
 def _inside(result: Result, test: MeasuredTest) -> Array:

@@ -1,7 +1,6 @@
 """Tables for spreadsheets: units in every header, one row per point."""
 
 from collections.abc import Sequence
-from dataclasses import astuple
 from typing import Any
 
 import numpy as np
@@ -16,7 +15,6 @@ from bushfit.model.arms import Arms, arm_rows
 from bushfit.model.covariance import Z95
 from bushfit.model.model import Model
 from bushfit.prediction.bands import Band
-from bushfit.prediction.other_bushings import OtherBushings
 from bushfit.prediction.resonance import PredictedResonance
 from bushfit.prediction.static_curve import StaticCurve
 from bushfit.prediction.stiffness import Prediction
@@ -326,18 +324,6 @@ def master_curve_table(shifted_sweeps: Sequence[ShiftedSweep]) -> pd.DataFrame:
         columns |= response_columns(place, sweep.measured) | {"reduced frequency [Hz]": shifted.reduced_frequency}
         tables.append(pd.DataFrame(columns | response_columns(place, shifted.reduced_stiffness, "reduced ")))
     return pd.concat(tables, ignore_index=True)
-
-
-def bushings_table(bushings: Sequence[OtherBushings]) -> pd.DataFrame:
-    """Table of the errors of each bushing, predicted by a fit to the other bushings.
-
-    Returns:
-        A row per bushing: name, points, NRMSE, reduced chi-square, mean gap of |K|, share of points in the band.
-    """
-    columns = ["bushing", "points", "NRMSE [%]", "chi2 [-]", "mean gap [%]", "in band [%]"]
-    table = pd.DataFrame([astuple(row) for row in bushings], columns=columns)
-    percent = [name for name in columns if "%" in name]
-    return table.assign(**{name: 100.0 * table[name] for name in percent})
 
 
 def shift_factors_table(shifted_sweeps: Sequence[ShiftedSweep]) -> pd.DataFrame:

@@ -12,13 +12,14 @@ from typing_extensions import TypedDict
 from bushfit.campaign.toml import body_lines, table_lines, toml_value
 from bushfit.effects import ORIGINS
 from bushfit.errors import quote_path
-from bushfit.geometry import STRAINING, Display, Place, Specimen, Unit, strain_factor_of_files
+from bushfit.geometry import STRAINING, Direction, Display, Place, Unit, strain_factor_of_files
 from bushfit.model.document import ModelFile
 from bushfit.model.file import to_document
 from bushfit.reading.measurement import Loop, Sweep, loss_factor
 from bushfit.reading.resonance import ResonanceTest
 from bushfit.reading.tablefile import Form, ending, to_bytes
 from bushfit.simulation.measured import Simulated
+from bushfit.templates import render_template
 
 
 class SimulationDocument(TypedDict):
@@ -49,38 +50,25 @@ def to_files(simulated: Simulated, form: Form = "csv") -> dict[str, bytes]:
         **{sweep.name: raw_sweep_table(sweep) for sweep in simulated.sweeps},
         **{test.name: raw_resonance_table(test) for _, test in simulated.resonances},
     }
+    origins = (ORIGINS[name] for name in simulated.truth.effects if name in ORIGINS)
+    campaign = render_template(
+        Path(__file__).with_name("campaign.toml.jinja"),
+        plan=simulated.plan,
+        laws=sorted({Path(origin.file).resolve().as_posix() for origin in origins if origin.file}),
+        body=body_lines(simulated.truth.bushing, simulated.specimens),
+        tests=[(kind, getattr(simulated, kind)) for kind in ("loops", "sweeps", "validation")],
+        resonances=simulated.resonances,
+        directions=list(Direction),
+        ending=ending(form),
+        quoted=lambda text: quote_path(Path(str(text))),
+        table_lines=table_lines,
+        toml_value=toml_value,
+    )
     return {
         **{f"{name}.{ending(form)}": to_bytes(name, table, form) for name, table in tables.items()},
-        "campaign.toml": _campaign_toml(simulated, form).encode(),
+        "campaign.toml": campaign.encode(),
         "truth.json": (json.dumps(to_document(simulated.result), indent=1) + "\n").encode(),
     }
-
-
-def _campaign_toml(simulated: Simulated, form: Form) -> str:
-    """Content of the campaign file, which names tables of the file format `form`."""
-    plan, end = simulated.plan, ending(form)
-    lines = [
-        f"# Simulated by bushfit simulate with seed {plan.seed}: no rubber was tested. The model is in truth.json."
-    ]
-    origins = (ORIGINS[name] for name in simulated.truth.effects if name in ORIGINS)
-    for law in {origin.file for origin in origins if origin.file}:
-        lines += ["[effects]", f"file = {toml_value(Path(law).resolve().as_posix())}", ""]
-    lines += body_lines(simulated.truth.bushing, simulated.specimens)
-    if plan.level_gain_error or plan.level_phase_error:  # repeats do not show these errors: the campaign states them
-        errors = {"gain_error": (plan.level_gain_error, "1"), "phase_error": (plan.level_phase_error, "rad")}
-        lines += ["", "[rig]", *(f'{key} = "{size:.6g} {unit}"' for key, (size, unit) in errors.items())]
-    for kind in ("loops", "sweeps", "validation"):
-        for test in getattr(simulated, kind):
-            lines += table_lines(kind, f"{test.name}.{end}", test.direction, test.temperature, test.preload)
-    for mass, resonance in simulated.resonances:
-        file, folder = (quote_path(Path(name)) for name in (f"{resonance.name}.{end}", resonance.name))
-        option = "specimen" if isinstance(resonance.direction, Specimen) else "direction"
-        place = quote_path(Path(str(resonance.direction)))
-        lines += ["", "# This command converts the resonance test to a sweep:"]
-        lines += [f'# bushfit reduce {file} --mass "{mass:.6g} kg" --{option} {place} -o {folder}']
-        sweep_lines = table_lines("sweeps", f"{resonance.name}/sweep.{end}", resonance.direction)
-        lines += [f"# {line}" for line in sweep_lines if line]
-    return "\n".join(lines) + "\n"
 
 
 def raw_loop_table(loop: Loop) -> pd.DataFrame:

@@ -104,7 +104,9 @@ def asked(campaign: Campaign, model: Model | None = None, **settings: object) ->
 
 
 def said(diagnosis: Diagnosis) -> str:
-    return f"{diagnosis.verdict} " + " + ".join("|".join((e.name, *e.alternatives)) for e in diagnosis.effects)
+    return f"{diagnosis.verdict} " + " + ".join(
+        "|".join((e.name, *(other.label for other in e.alternatives))) for e in diagnosis.effects
+    )
 
 
 def names(diagnosis: Diagnosis) -> set[str]:

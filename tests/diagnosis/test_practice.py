@@ -85,7 +85,7 @@ def right(truth: dict[str, Any], diagnosis: Diagnosis) -> bool:
         return diagnosis.verdict in ("unexplained", "described", "partly")
     if not truth["truth"]:
         return diagnosis.verdict == "consistent"
-    sets = [{effect.name, *effect.alternatives} for effect in diagnosis.effects]
+    sets = [{effect.name, *(other.label for other in effect.alternatives)} for effect in diagnosis.effects]
     everything = all(any(name in members and len(members) <= 3 for members in sets) for name in truth["truth"])
     return everything and len(sets) == len(truth["truth"]) and diagnosis.verdict in ("named", "ambiguous")
 
@@ -174,7 +174,7 @@ def test_a_wrong_strain_scale_is_named(truth):
     assert 2 * len(seen) >= len(found)
     for diagnosis in seen:
         (named,) = diagnosis.effects
-        assert SCALE in (named.name, *named.alternatives)
+        assert SCALE in (named.name, *(other.label for other in named.alternatives))
         assert "level" not in diagnosis.summary
         if diagnosis.verdict == "named":
             low, high = diagnosis.result.interval(SCALE) or (np.inf, 0.0)

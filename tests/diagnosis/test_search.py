@@ -144,7 +144,7 @@ def test_a_radial_stiffness_off_the_formula_is_not_blamed_on_the_rig(reference_s
     campaign = changed(campaign, 1, ratio)
     diagnosis = asked(campaign)
     (found,) = diagnosis.effects
-    alike = {found.name, *found.alternatives}
+    alike = {found.name, *(other.label for other in found.alternatives)}
     assert any("stiffness_factor.radial" in name.split(" + ") for name in alike)
     if diagnosis.verdict == "ambiguous":
         # a displacement gain is a near twin; where 2 % are off, so is what gives way

@@ -149,8 +149,9 @@ def test_stated_constants_are_the_rotations_without_a_law(name, export_request, 
     for dof in (4, 5):
         for rank in range(1, 6):
             np.testing.assert_allclose(found[dof, rank][1], 1e3 * (60.0 + 6.0j), rtol=DIGITS)
-    assert "rotations about x and y: the stated constant, 60 N m/rad, loss factor 0.1" in " ".join(exported.omissions)
-    assert "no stiffness in" not in " ".join(exported.omissions)
+    omissions = " ".join(map(str, exported.omissions))
+    assert "rotations about x and y: the stated constant, 60 N m/rad, loss factor 0.1" in omissions
+    assert "no stiffness in" not in omissions
 
 
 def test_adams_holds_curve_and_damping(export_request, known):
@@ -202,7 +203,7 @@ def test_adams_says_how_far_its_element_is_off(export_request, known, kind):
         written = storage + turn
         ratio.append(np.abs(1e3 * written / stiffness) - 1.0)
         apart.append(np.abs(written.imag / written.real - stiffness.imag / stiffness.real))
-    line = next(line for line in exported.omissions if line.startswith(f"axial, {kind}: "))
+    line = next(line for line in map(str, exported.omissions) if line.startswith(f"axial, {kind}: "))
     low, high, loss = re.findall(r"is (\S+) to (\S+) %, of the loss factor up to (\S+)", line)[0]
     assert (float(low), float(high)) == pytest.approx((100.0 * np.min(ratio), 100.0 * np.max(ratio)), rel=0.05)
     assert float(loss) == pytest.approx(np.max(apart), rel=0.05)
@@ -220,7 +221,7 @@ def resting(model: Model, place: Direction, amplitude: float) -> float:
 def test_every_deck_says_what_it_is_of_and_needs_a_direction(export, export_request):
     body = predict(export_request.result, Specimen("DMA =1+1", "modulus"), [5.0, 10.0], [0.01])
     exported = export(replace(export_request, units=MM_T_S_N, predictions=(body, *export_request.predictions)))
-    assert "specimens: DMA =1+1" in exported.omissions
+    assert "specimens: DMA =1+1" in map(str, exported.omissions)
     for content in exported.files.values():
         text = content.decode("ascii")
         for words in ("bushing: CMP 15 961", "model: model.json", f"sha256: {HASH}", "units: mm", "limit:"):
@@ -236,7 +237,7 @@ def test_the_error_between_frequencies_that_is_told_is_the_one_there_is(name, at
     exported, found = read(
         name, replace(export_request, result=rigged, predictions=export_request.predictions[:1]), tmp_path
     )
-    line = next(line for line in exported.omissions if "between the frequencies" in line)
+    line = next(line for line in map(str, exported.omissions) if "between the frequencies" in line)
     claimed = float(line.split("up to ")[1].split(" %")[0]) / 100.0
     fine, worst = np.linspace(5.0, 155.0, 601), 0.0
     for (_, rank), (f, k) in found.items():
