@@ -120,6 +120,10 @@ class NoTestError(MeasurementError):
     """A table that contains neither a loop nor a sweep."""
 
 
+class ResonanceTestError(NoTestError):
+    """A resonance test, which `bushfit reduce` converts to a sweep."""
+
+
 class NoColumnError(MeasurementError):
     """A table that lacks the column header that the user stated."""
 

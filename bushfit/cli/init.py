@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from bushfit.caveat import Caveat
 from bushfit.cli.file_options import QUESTIONS, STATED, direction_error, metadata_options, options_named, value_type
 from bushfit.cli.options import command_called, flag, option, option_group, option_name
 from bushfit.cli.output import Output, with_output
@@ -80,7 +81,7 @@ def command(files: tuple[Path, ...], name: str | None, no_input: bool, output: O
     sources, left_out = gather(files, test_options)
     check_free(folder, [target], overwrite=output.force)
     inspections, histories = inspect_sources(sources, questions, is_sized=bushing is not None)
-    inspections, sentences = with_specimens_named(inspections), [*left_out, *histories]
+    inspections, left_out = with_specimens_named(inspections), [*left_out, *histories]
     if bushing is None and not all(isinstance(inspection.direction, Specimen) for inspection in inspections):
         bushing = questions.complete(sizes, size)
     table = bushing and bushing[1]
@@ -103,17 +104,17 @@ def command(files: tuple[Path, ...], name: str | None, no_input: bool, output: O
     for sentence, count in Counter(inspection.assumed for inspection in inspections).items():
         if sentence:
             output.print(f"{count} test{'s' * (count > 1)}: {sentence}")
-    for sentence in sentences:
-        output.print(f"left out: {sentence}")
+    for reason in left_out:
+        output.print(f"left out: {reason}")
     document: InspectionDocument = {
         "campaign": written[target],
         "files": [inspection.to_document() for inspection in inspections],
-        "left_out": sentences,
+        "left_out": [reason.text for reason in left_out],
     }
     results = [ResultFile(file, "raw", text.encode()) for file, text in written.items()]
     output.write(folder, results, document, files)
     following = f"bushfit {'batch' if len(written) > 1 else 'run'} {quote_path(folder / target)}"
-    if any("bushfit reduce" in sentence for sentence in sentences):
+    if any(reason.kind == "to_reduce" for reason in left_out):
         again = "bushfit reduce as stated above, then bushfit init again with sweep.csv"
         following = f"{again}; or, without these tests, {following}"
     output.print(f"next: {following}")
@@ -165,7 +166,7 @@ def make_bushing(name: str, sizes: Mapping[str, str | None]) -> tuple[Bushing, d
 
 def inspect_sources(
     sources: Sequence[TestSource], questions: Questions, *, is_sized: bool
-) -> tuple[list[Inspection], list[str]]:
+) -> tuple[list[Inspection], list[Caveat]]:
     """Read loops and sweeps from files, and determine the direction or specimen of each.
 
     Args:
@@ -175,13 +176,13 @@ def inspect_sources(
             of a block in shear.
 
     Returns:
-        The inspections, and a sentence on each file that is left out, such as a raw history in a folder.
+        The inspections, and a warning on each file that is left out, such as a raw history in a folder.
     """
     keys = [(source.file.resolve(), str(source.test_options)) for source in sources]
     if twice := [source for source, key in zip(sources, keys, strict=True) if keys.count(key) > 1]:
         raise CampaignError("a file is given twice", found=str(twice[0]), expected="each file once")
     inspections: list[Inspection] = []
-    sentences: list[str] = []
+    left_out: list[Caveat] = []
     histories: dict[str, list[TestSource]] = defaultdict(list)
     for source in sources if questions.enabled else track("tests looked at", sources):
         look = partial(inspect_source, source, is_sized=is_sized, is_asking=questions.enabled)
@@ -190,7 +191,8 @@ def inspect_sources(
         except (click.UsageError, NoTestError) as error:
             if source.is_named:
                 raise
-            sentences.append(f"{source}: {error.message if isinstance(error, click.UsageError) else error.problem}")
+            why = error.message if isinstance(error, click.UsageError) else error.problem
+            left_out.append(Caveat("left_out", why).about(source))
             continue
         if inspection.kind != "history":
             inspections.append(inspection)
@@ -207,8 +209,9 @@ def inspect_sources(
     for direction, raw in histories.items():
         several = f"{len(raw)} raw stepped-sine histories, {direction}"
         subject, objects = (several, "them") if len(raw) > 1 else (f"{raw[0]}: a raw stepped-sine history", "it")
-        sentences.append(f"{subject}; {_reduce_command(direction, raw)} converts {objects} to sweep.csv")
-    return inspections, sentences
+        sentence = f"{subject}; {_reduce_command(direction, raw)} converts {objects} to sweep.csv"
+        left_out.append(Caveat("to_reduce", sentence))
+    return inspections, left_out
 
 
 def _reduce_command(direction: str, histories: Sequence[TestSource]) -> str:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from rich.markup import escape
 
+from bushfit.caveat import Caveat
 from bushfit.cli.file_options import metadata_options, options_named
 from bushfit.cli.options import command_called
 from bushfit.cli.output import Output, with_output
@@ -45,8 +46,8 @@ def command(files: tuple[Path, ...], test_options: Mapping[str, Any], output: Ou
     from bushfit.inspection.record import pasted_text, with_specimens_named
 
     sources, left_out = gather(files, test_options)
-    for sentence in left_out:
-        output.print(f"left out: {sentence}")
+    for reason in left_out:
+        output.print(f"left out: {reason}")
     last = math.ceil(len(sources) / _FILES_A_PICTURE)
     pages = ["inspect", *(f"inspect_{page}" for page in range(2, last + 1))]
     folder = output.folder(files[0].stem)
@@ -60,7 +61,7 @@ def command(files: tuple[Path, ...], test_options: Mapping[str, Any], output: Ou
             if source.is_named:
                 errors.append(error)
             else:
-                left_out = (*left_out, f"{source}: {error.problem} ({error.found})")
+                left_out.append(Caveat("left_out", f"{error.problem} ({error.found})").about(source))
                 output.print(f"left out: {left_out[-1]}")
         except BushfitError as error:
             errors.append(error)
@@ -80,7 +81,7 @@ def command(files: tuple[Path, ...], test_options: Mapping[str, Any], output: Ou
         raise errors[-1]
     document: InspectionDocument = {
         "files": [inspection.to_document() for inspection in inspections],
-        "left_out": list(left_out),
+        "left_out": [reason.text for reason in left_out],
         "campaign": text,
     }
     if output.formats.pictures:

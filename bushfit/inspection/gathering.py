@@ -13,7 +13,7 @@ import numpy as np
 from bushfit.campaign.campaign import TEST_FILES
 from bushfit.campaign.copies import group_copies
 from bushfit.caveat import Caveat
-from bushfit.errors import BushfitError, NoColumnError, NoTestError, printable
+from bushfit.errors import BushfitError, NoColumnError, NoTestError, ResonanceTestError, printable
 from bushfit.fitting.measured_loop import MeasuredLoop
 from bushfit.fitting.measured_sweep import MeasuredSweep
 from bushfit.fitting.preparation import prepare_loops, prepare_sweeps
@@ -71,7 +71,7 @@ class TestSource:
         return inspect_file(self.file, self.test_options, self.of_book)
 
 
-def gather(paths: Sequence[Path], test_options: Mapping[str, Any]) -> tuple[list[TestSource], tuple[str, ...]]:
+def gather(paths: Sequence[Path], test_options: Mapping[str, Any]) -> tuple[list[TestSource], list[Caveat]]:
     """Find the tests in files, in the sheets of workbooks, and in folders and their subfolders.
 
     Args:
@@ -79,12 +79,13 @@ def gather(paths: Sequence[Path], test_options: Mapping[str, Any]) -> tuple[list
         test_options: keys of [[loops]] and [[sweeps]] that apply to all tests, with the values that TOML gives.
 
     Returns:
-        The tests in order, and a sentence for each file and sheet without a test.
+        The tests in order, and for each file and sheet without a test the reason: of the kind "to_reduce" for a test
+        that `bushfit reduce` converts, else "left_out".
 
     Raises:
         NoTestError: a folder without a test.
     """
-    sources, left_out = list[TestSource](), list[str]()
+    sources, left_out = list[TestSource](), list[Caveat]()
     for path in paths:
         files, sentences = list_folder(path) if path.is_dir() else ([TestSource(path)], [])
         left_out += sentences
@@ -97,7 +98,7 @@ def gather(paths: Sequence[Path], test_options: Mapping[str, Any]) -> tuple[list
             raise NoTestError(
                 "no file of this folder contains a test",
                 file=path,
-                found="; ".join(left_out) or "nothing",
+                found="; ".join(map(str, left_out)) or "nothing",
                 expected="loops or sweeps, as " + ", ".join(TEST_FILES[:4]) + " or .xlsx",
                 hint="bushfit inspect FILE shows how bushfit reads a file",
             )
@@ -106,26 +107,26 @@ def gather(paths: Sequence[Path], test_options: Mapping[str, Any]) -> tuple[list
         split, sentences = split_rows(source)
         tests += split
         left_out += sentences
-    return tests, tuple(left_out)
+    return tests, left_out
 
 
-def list_folder(folder: Path) -> tuple[list[TestSource], list[str]]:
+def list_folder(folder: Path) -> tuple[list[TestSource], list[Caveat]]:
     """List the files of a folder and its subfolders by name; a subfolder such as "P01" names the specimen of its files.
 
     Returns:
-        Files that may contain tests, and a sentence on each of the other files.
+        Files that may contain tests, and a warning on each of the other files.
     """
-    files, left_out = list[TestSource](), list[str]()
+    files, left_out = list[TestSource](), list[Caveat]()
     for path in sorted(folder.iterdir()):
-        path_text = printable(str(path))
+        why = ""
         if path.name.startswith((".", "~$")):
             continue
         if not path.exists():
-            left_out.append(f"{path_text}: a broken link")
+            why = "a broken link"
         elif printable(path.name) != path.name:
-            left_out.append(f"{path_text}: its name contains characters that are not text; rename it")
+            why = "its name contains characters that are not text; rename it"
         elif path.is_dir() and not os.access(path, os.R_OK | os.X_OK):
-            left_out.append(f"{path_text}: no permission to read this folder")
+            why = "no permission to read this folder"
         elif path.is_dir() and not path.is_symlink():
             inner_files, inner_left_out = list_folder(path)
             if number := labels_in_names(path.name).specimen_number:
@@ -135,11 +136,12 @@ def list_folder(folder: Path) -> tuple[list[TestSource], list[str]]:
         elif path.is_file() and path.suffix.lower() in TEST_FILES:
             files.append(TestSource(path, is_named=False))
         else:
-            left_out.append(f"{path}: {'a link to a folder' if path.is_dir() else 'not a table (by its extension)'}")
+            why = "a link to a folder" if path.is_dir() else "not a table (by its extension)"
+        left_out += [Caveat("left_out", why).about(printable(str(path)))] if why else []
     return files, left_out
 
 
-def split_sheets(file: TestSource, test_options: Mapping[str, Any]) -> tuple[list[TestSource], list[str]]:
+def split_sheets(file: TestSource, test_options: Mapping[str, Any]) -> tuple[list[TestSource], list[Caveat]]:
     """Select the sheets of a workbook that may contain a test, or the file itself if it has one sheet.
 
     Args:
@@ -147,7 +149,7 @@ def split_sheets(file: TestSource, test_options: Mapping[str, Any]) -> tuple[lis
         test_options: options that apply to all tests; with the key `sheet`, the file is one test.
 
     Returns:
-        The tests, and a sentence on each sheet or file without one.
+        The tests, and a warning on each sheet or file without one.
     """
     sheets, whole = [], distribute_options([file], test_options)
     with suppress(BushfitError):  # which the inspection of the file reports
@@ -155,14 +157,15 @@ def split_sheets(file: TestSource, test_options: Mapping[str, Any]) -> tuple[lis
     parts = [replace(file, sheet=sheet.sheet) for sheet in sheets] if len(sheets) > 1 else [file]
     if len(parts) == 1 and file.is_named:
         return whole, []
-    tests, left_out, without = list[TestSource](), list[str](), set[str | None]()
+    tests, left_out, without = list[TestSource](), list[Caveat](), set[str | None]()
     for part in distribute_options(parts, test_options):
         try:
             recognize_table(part.file, part.test_options)
         except NoTestError as error:
             without.add(part.sheet)
             why = f"{error.problem} ({error.found})" if error.found else f"{error.problem}; {error.hint}"
-            left_out.append(f"{part}: {why}")
+            kind = "to_reduce" if isinstance(error, ResonanceTestError) else "left_out"
+            left_out.append(Caveat(kind, why).about(part))
             continue
         except BushfitError:  # which the inspection of the test reports
             pass
@@ -175,15 +178,15 @@ def split_sheets(file: TestSource, test_options: Mapping[str, Any]) -> tuple[lis
     return tests, left_out
 
 
-def split_rows(source: TestSource) -> tuple[list[TestSource], list[str]]:
+def split_rows(source: TestSource) -> tuple[list[TestSource], list[Caveat]]:
     """Split a file with columns for direction, part number, run, temperature or preload into one test for each level.
 
     The runs of a sweep are repeats and are not split. The runs of a loop are split only if time restarts in each run.
 
     Returns:
-        The tests, and a sentence on the rows of each combination that is left out.
+        The tests, and a warning on the rows of each combination that is left out.
     """
-    test_options, tests, left_out = source.test_options, list[TestSource](), list[str]()
+    test_options, tests, left_out = source.test_options, list[TestSource](), list[Caveat]()
     try:
         table, is_sweep = recognize_table(source.file, source.without("direction", "specimen_number").test_options)
         columns = dict(table.row_labels)
@@ -202,7 +205,8 @@ def split_rows(source: TestSource) -> tuple[list[TestSource], list[str]]:
         return [source], []
     for texts, tests_at_levels in levels.items():
         if "run" in columns and not is_sweep and (count := labels.count(texts)) < FEWEST_LOOP_ROWS:
-            left_out.append(f"{source}: {count} rows of run {', '.join(texts)} are too few for a loop")
+            why = f"{count} rows of run {', '.join(texts)} are too few for a loop"
+            left_out.append(Caveat("left_out", why).about(source))
             continue
         keys: dict[str, Any] = dict(zip(columns, texts, strict=True))
         run: dict[str, Any] = {}
@@ -214,7 +218,7 @@ def split_rows(source: TestSource) -> tuple[list[TestSource], list[str]]:
             tests += [replace(source, test_options={**test_options, **keys, **run, **test}) for test in tests_at_levels]
         else:
             why = "other values were stated" if is_direction else "the direction is unknown"
-            left_out.append(f"{source}: rows of {', '.join(texts)} are not used: {why}")
+            left_out.append(Caveat("left_out", f"rows of {', '.join(texts)} are not used: {why}").about(source))
     return (tests, left_out) if tests else ([source], [])
 
 

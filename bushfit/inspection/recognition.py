@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from bushfit.campaign.bodies import SpecimenSettings
-from bushfit.errors import BushfitError, NoTestError, quote_path
+from bushfit.errors import BushfitError, NoTestError, ResonanceTestError, quote_path
 from bushfit.geometry import STRAINING, TRANSLATION, Direction, Motion, Place, Specimen
 from bushfit.reading.finding import find_table
 from bushfit.reading.headers import LOOP_COLUMNS, RESONANCE_COLUMNS, SWEEP_COLUMNS, Vocabulary
@@ -77,7 +77,7 @@ def recognize_table(file: Path, test_options: Mapping[str, Any]) -> tuple[Table,
     if resonance and is_resonance(resonance):
         hint = f'bushfit reduce {quote_path(file)} --mass "..." converts it to a sweep'
         problem, expected = "this is a resonance test, not a sweep", "loops and sweeps"
-        raise resonance.error(problem, kind=NoTestError, expected=expected, hint=hint)
+        raise resonance.error(problem, kind=ResonanceTestError, expected=expected, hint=hint)
     if not opened:
         errors = [error for _, error in failed]
         raise NoTestError(**vars(next((one for one in errors if one.problem != "there is no header"), errors[0])))
