@@ -199,7 +199,8 @@ class ClaimScreening:
     def best(self, candidates: Sequence[Claim], limit: int) -> list[Claim]:
         """Select the recording mistakes worth a refit: those whose correction may lower the misfit, the best first.
 
-        A correction that leaves the misfit as it is, such as one common factor of all stiffnesses, is not selected.
+        A correction that leaves the misfit as it is, such as one common factor of all stiffnesses, is not selected, nor
+        is one that another correction of the same tests surpasses.
 
         Args:
             candidates: hypotheses of mistakes to compare.
@@ -207,9 +208,12 @@ class ClaimScreening:
         """
         before, misfits = self.misfit(None), np.array([self.misfit(claim) for claim in candidates])
         changed = np.abs(misfits - before) > _LEAST_CHANGE * before
-        order = np.argsort(misfits, kind="stable")
-        better = (index for index in order if changed[index] and misfits[index] < _WORTH_A_FIT * before)
-        return [candidates[index] for index in better][:limit]
+        best_of_tests, selected = dict[tuple[int, ...], float](), list[Claim]()
+        for index in np.argsort(misfits, kind="stable"):
+            claim, misfit = candidates[index], float(misfits[index])
+            if changed[index] and misfit < _WORTH_A_FIT * min(before, best_of_tests.setdefault(claim.tests, misfit)):
+                selected.append(claim)
+        return selected[:limit]
 
     def misfit(self, claim: Claim | None) -> float:
         """Smallest sum of squared residuals of the paper's five-parameter model, after correction of one mistake.
@@ -325,7 +329,7 @@ def _corrected_points(data_set: MeasuredTest, mistake: Mistake | None) -> tuple[
     else:
         sweep, noise = (
             Sweep(data_set.name, data_set.direction, data_set.frequency, data_set.amplitude, data_set.measured),
-            0.0,
+            data_set.gain_error,
         )
         mended = mistake.corrected_harmonic(sweep) if mistake else sweep
     points = np.stack((mended.frequency, mended.amplitude_reached))

@@ -1,7 +1,8 @@
 """Faulty parts of the tests: a frequency, a level, a repeat or a loop that disagrees with the rest of the tests.
 
 A level is the set of all points of a sweep at one constant amplitude, or at one constant frequency. A fault is an error
-of gain and phase that all points of the part have in common; levels and repeats also have a slope of both.
+of gain and phase that all points of the part have in common (levels and repeats also have a slope of both), an error of
+gain alone, or an error of each point.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations, groupby
 from math import log
+from typing import Literal
 
 import numpy as np
 from scipy.special import bdtrc
@@ -27,6 +29,8 @@ from bushfit.model.result import Outlier
 from bushfit.reading.preload import add_preload
 from bushfit.units import number
 
+#: Errors of the points of a faulty part.
+Form = Literal["shift", "gain", "points"]
 #: Maximum number of neighbouring frequencies that one disturbance covers: mains hum and its sidebands.
 _WIDEST = 3
 #: Ratio of frequencies or of amplitudes up to which they are the same.
@@ -52,7 +56,8 @@ class FaultyPart(Explanation):
         may_be_physics: True if an effect that the model lacks could change the same points, and not a wrong test: the
             smallest or largest level of a direction, a loop that no other test covers, or frequencies in
             all directions at every amplitude.
-        is_scattered: True if each point has an independent error; False for a common shift or slope.
+        form: errors of the points: "shift", a common gain and phase error, which may slope; "gain", a common gain
+            error; "points", an independent error of each point.
         amount: prior standard deviation of each error, relative to |K|; 0 before the fault is part of an explanation.
     """
 
@@ -60,7 +65,7 @@ class FaultyPart(Explanation):
     frequency: tuple[float, float]
     amplitude: tuple[float, float]
     may_be_physics: bool = field(default=False, kw_only=True)
-    is_scattered: bool = field(default=False, kw_only=True)
+    form: Form = field(default="shift", kw_only=True)
     amount: float = field(default=0.0, kw_only=True)
 
     @property
@@ -69,17 +74,29 @@ class FaultyPart(Explanation):
         assert self.group is not None
         return self.group.whole
 
-    def point_by_point(self) -> FaultyPart:
-        """Replace the common shift and slope of this part by an independent error of each of its points.
+    @property
+    def forms(self) -> tuple[Form, ...]:
+        """Forms of the errors, which are equally probable: most causes change the gain of a level or repeat alone."""
+        by_family: dict[str, tuple[Form, ...]] = {"loop": ("shift",), "frequency": ("shift", "points")}
+        return by_family.get(self.family, ("shift", "gain", "points"))
 
-        Returns:
-            Faulty part with one column for each residual of its points.
+    def in_form(self, form: Form) -> FaultyPart:
+        """Replace the common shift of this part by errors of another form.
+
+        Args:
+            form: errors of the points; "points" gives one column for each residual of the part's points.
         """
-        size = np.abs(self.columns).max(axis=0)
-        rows = np.flatnonzero(size)
-        columns = np.zeros((rows.size, size.size))
-        columns[np.arange(rows.size), rows] = size[rows]
-        return replace(self, group=Group(columns, np.eye(rows.size), act_together=True), is_scattered=True)
+        assert self.group is not None
+        group = self.group
+        if form == "gain":
+            group = replace(group, columns=group.columns[:1], unit=group.unit[:1])
+        elif form == "points":
+            size = np.abs(self.columns).max(axis=0)
+            rows = np.flatnonzero(size)
+            columns = np.zeros((rows.size, size.size))
+            columns[np.arange(rows.size), rows] = size[rows]
+            group = Group(columns, np.eye(rows.size), act_together=True)
+        return replace(self, group=group, form=form)
 
     def region(self, residual: Array, change: float) -> MisfitRegion:
         """Describe this faulty part as a region in which tests and model disagree, for the report.

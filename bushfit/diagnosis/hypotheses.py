@@ -177,7 +177,7 @@ class SearchState:
         """Residuals linearised at the fit, to compute the evidence for further explanations."""
         bare, moves, columns = self.bare, self.has_influence, self.columns
         precision = np.array([self.precision.get(name, 0.0) for name in bare.names])[moves]
-        common = [part for part in self.faulty_parts if not part.is_scattered]
+        common = [part for part in self.faulty_parts if part.form != "points"]
         rows = np.concatenate([bare.jacobian[moves], *(part.columns for part in common)])
         precision = np.concatenate([precision, *(np.full(len(part.columns), part.amount**-2) for part in common)])
         return LinearModel(bare.residual, rows, precision, columns.errors, columns.compound)
@@ -185,7 +185,7 @@ class SearchState:
     @cached_property
     def columns(self) -> ExplanationColumns:
         """Columns of the residuals for further explanations, given the scatter of the faulty parts in this state."""
-        scattered = [part.amount * part.columns for part in self.faulty_parts if part.is_scattered]
+        scattered = [part.amount * part.columns for part in self.faulty_parts if part.form == "points"]
         variances = [np.square(columns).sum(axis=0) for columns in scattered]
         return self.tests.columns.with_variance(np.sum(variances, axis=0)) if variances else self.tests.columns
 
@@ -232,7 +232,7 @@ class SearchState:
         columns = []
         for part in self.faulty_parts:
             fitted = self.tests.faulty_parts_in_fits[part.name]
-            columns.append(part.amount * (fitted.point_by_point() if part.is_scattered else fitted).columns)
+            columns.append(part.amount * fitted.in_form(part.form).columns)
         compound = self.tests.compound_in_fits if deviation else None
         columns += [deviation * compound.whole] if compound else []
         return np.concatenate(columns) if columns else None

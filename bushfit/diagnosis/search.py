@@ -38,8 +38,9 @@ from bushfit.progress import track
 
 #: Maximum number of refits of hypotheses that are probable by the linear model alone; for time.
 _SETTLED = 8
-#: Number of mistakes that are fitted, the most promising first; number of faulty parts added to a state; for time.
-_CLAIMS, _FAULTY_PARTS = 4, 2
+#: Number of mistakes that are fitted, and that are combined with effects in each round, the most promising first; and
+#: number of faulty parts added to a state; for time.
+_CLAIMS, _CORRECTED, _FAULTY_PARTS = 4, 2, 2
 #: Natural log of the odds below its state within which an effect is refitted; for time.
 _SLIGHT = 3.0
 #: Number of rivals that are refitted from the values of the most probable state in each round; for time.
@@ -134,9 +135,13 @@ class Search:
             limit = max(hypothesis.log_posterior for hypothesis in followed) - LOG_ODDS_CUTOFF
             nearest = sorted(fresh, key=lambda state: -state.log_posterior)
             beam = [state for state in nearest[: BEAM[min(depth, 1)]] if state.log_posterior > limit]
-            corrected = next((state for state in nearest if state.tests.claim), None)
-            if corrected and corrected not in beam and self._is_improved(corrected):
-                beam.append(corrected)  # tests with a mistake and an effect are explained by neither alone
+            corrected = dict[tuple[int, ...], SearchState]()  # the most probable one with a mistake in these tests
+            for state in nearest:
+                if state.tests.claim:
+                    corrected.setdefault(state.tests.claim.tests, state)
+            for state in [*corrected.values()][:_CORRECTED]:
+                if state not in beam and self._is_improved(state):
+                    beam.append(state)  # tests with a mistake and an effect are explained by neither alone
             if not beam:
                 break
         for linear in self._settle_linear():
@@ -261,33 +266,31 @@ class Search:
         return list(grown.values())
 
     def _with_faulty_parts(self, step: _Step) -> Iterator[SearchState]:
-        """Extend a state by each of its likeliest faulty parts of the tests, with a common shift or an error per point.
+        """Extend a state by each of its likeliest faulty parts of the tests, with errors of the most probable form.
 
         Args:
             step: state to extend, with the evidence for faulty parts.
         """
         state = step.state
+        is_bent = state.plain.reduced_chi_square > _BENT  # perhaps by one of the parts, which a refit would show
         faulty_parts = [(part, evidence) for part, evidence in step.evidence if isinstance(part, FaultyPart)]
         faulty_parts.sort(key=lambda pair: -(self._log_odds("part", pair[0].name) + pair[1].total))
-        for part, shifted in faulty_parts[:_FAULTY_PARTS]:
-            better, evidence = part, shifted
-            if part.family != "loop":
-                scattered = part.point_by_point()
-                groups = GroupSet([scattered.group], state.columns.errors)  # type: ignore[list-item]
-                (of_points,) = state.weigh([groups])
-                if of_points.total > shifted.total:
-                    better, evidence = scattered, of_points
+        for common, _ in faulty_parts[:_FAULTY_PARTS]:
+            if state.key | {common.name} in self._visited:
+                continue
+            parts = [common.in_form(form) for form in common.forms]
+            evidences = state.weigh([GroupSet([part.group for part in parts if part.group], state.columns.errors)])
+            part, evidence = max(zip(parts, evidences, strict=True), key=lambda pair: pair[1].total)
             log_odds = self._log_odds("part", part.name)
-            improves = state.log_weight + log_odds + evidence.total > state.log_posterior
-            if not improves or state.key | {part.name} in self._visited:
+            if state.log_weight + log_odds + evidence.total < state.log_posterior - _SLIGHT * is_bent:
                 continue
             grown = replace(
                 state,
-                faulty_parts=(*state.faulty_parts, replace(better, amount=evidence.likeliest)),
+                faulty_parts=(*state.faulty_parts, replace(part, amount=evidence.likeliest)),
                 log_prior=state.log_prior + log_odds,
                 change=max(state.change, evidence.size),
             )
-            if state.plain.reduced_chi_square > _BENT:  # perhaps by the part
+            if is_bent:
                 starts = [{}] if state.effects else [{}, self.start]
                 models, tests, columns = {"": grown.fit.model}, grown.fit.data_sets, grown.free_columns(0.0)
                 fits = [fit for s in starts for fit in self._fit_rivals(models, tests, s, columns=columns).values()]
@@ -358,7 +361,7 @@ def prior_odds(explanations: Sequence[Explanation]) -> dict[tuple[str, str], flo
 
     The odds of a kind, in `priors.ODDS`, are divided equally among its families. In a family of effects, the effect
     that acts in all directions has half, and those in single directions share the other half; in a family of faulty
-    parts, all have equal odds.
+    parts, all have equal odds, divided among the forms of a fault.
 
     Args:
         explanations: all explanations considered.
@@ -372,6 +375,8 @@ def prior_odds(explanations: Sequence[Explanation]) -> dict[tuple[str, str], flo
     for explanation in explanations:
         kind, count = explanation.kind, members[explanation.kind, explanation.family]
         share = ODDS[kind] / families[kind]
+        if isinstance(explanation, FaultyPart):
+            share /= len(explanation.forms)
         if kind != "effect":
             share /= count
         elif count > 1:

@@ -14,8 +14,10 @@ from hypothesis import strategies as st
 from rigged import SHARED, Tamper, asked, said
 from tries import some
 
+from bushfit.diagnosis.claims import ClaimScreening, claims
 from bushfit.effects.mistakes import MISTAKES
 from bushfit.errors import FitError
+from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.geometry import Bushing, Direction
 from bushfit.reading.measurement import Loop, Sweep
 
@@ -108,6 +110,18 @@ def test_a_mistake_in_every_explanation_is_reported_before_the_rest_is_decided(m
     assert said(diagnosis) == "ambiguous kilogram_force + kilogram_force"
     assert diagnosis.summary.startswith("these tests agree if the forces of loop_axial_1 and loop_axial_2 are kgf")
     assert not diagnosis.added
+
+
+def test_of_the_corrections_of_the_same_tests_those_far_behind_leave_room_for_others(measured, monkeypatch):
+    """Rates of one loop often fit a rubber of another law by chance; they must not crowd out amplitudes of sweeps."""
+    data = PreparedCampaign.from_campaign(measured(None, SHARED))
+    misfits = {"sixty_times_faster": 30.0, "ten_times_faster": 50.0, "peak_to_peak": 90.0}
+    monkeypatch.setattr(ClaimScreening, "misfit", lambda _, c: misfits[c.mistake.name] if c else 100.0)
+    possible = [claim for claim in claims(data, ()) if claim.mistake.name in misfits and len(claim.tests) == 1]
+    selected = {claim.labels for claim in ClaimScreening(data).best(possible, 9)}
+    assert ("peak_to_peak:sweep_axial",) in selected
+    assert ("sixty_times_faster:loop_axial_1",) in selected
+    assert ("ten_times_faster:loop_axial_1",) not in selected
 
 
 def test_what_all_tests_share_is_not_seen_and_not_named(measured):

@@ -18,6 +18,7 @@ from rigged import (
     SMALLER,
     TWO,
     asked,
+    both,
     changed,
     loop_too_strong,
     names,
@@ -36,17 +37,21 @@ from bushfit.simulation.undisturbed import undisturbed
 
 #: The axial level of 0.2 mm.
 level_too_stiff = off(0, 1.05, amplitude=LEVELS[1])
+#: The second sweep, at its smallest level, or as a whole (as by a preload) and once more at its largest level.
+smallest_too_stiff = off(1, 1.06, amplitude=LEVELS[0])
+largest_too_stiff = both(off(1, 1.1), off(1, 1.04, amplitude=LEVELS[2]))
 
 
-def test_a_level_under_one_of_two_preloads_is_measured_again(measured):
-    """The smallest level, which could be friction without a preload; under 500 N alone no effect changes it."""
+@pytest.mark.parametrize(("tamper", "level"), [(smallest_too_stiff, "0.1"), (largest_too_stiff, "0.5")])
+def test_a_level_under_one_of_two_preloads_is_measured_again(measured, tamper, level):
+    """The smallest level could be friction, the largest the softening of others after it, but a level alone is off."""
     axial = [
         replace(measured(seed=seed).sweeps[0], name=f"{seed}", preload=Preload(500.0 * seed, "N")) for seed in (0, 1)
     ]
     campaign = replace(measured(), loops=(), sweeps=tuple(axial))
-    diagnosis = asked(off(1, 1.06, amplitude=LEVELS[0])(campaign))
+    diagnosis = asked(tamper(campaign))
     assert diagnosis.verdict == "unexplained"
-    assert "measure again: the axial level 0.1 mm at a preload of 500 N" in diagnosis.next_test
+    assert f"measure again: the axial level {level} mm at a preload of 500 N" in diagnosis.next_test
 
 
 @pytest.mark.parametrize(
