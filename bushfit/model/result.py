@@ -339,19 +339,14 @@ class Result:
         """Warning that the tests do not rule out other models, in a list; empty if they do."""
         if not self.alternatives:
             return []
-        shares = dict[str, float]()
-        for alternative in self.alternatives:
-            name = " + ".join(sorted(set(alternative.model.effects) - {*self.model.effects}))
-            shares[name] = shares.get(name, 0.0) + alternative.probability
-        named = [f"{name} (probability {100.0 * share:.0f} %)" for name, share in shares.items() if name]
+        others = [one for one in self.alternatives if not {*one.model.effects} <= {*self.model.effects}]
+        names = dict.fromkeys(name for one in others for name in one.model.effects if name not in self.model.effects)
         used = "a smooth correction" if self.model.unnamed else "the most probable model"
-        sentence = (
-            f"the prediction uses {used} in place of {' or '.join(named)}"
-            if named
-            else "the tests permit other values of the parameters"
-        )
-        sentence += ": the bands, low to high, include each alternative"
-        return [Caveat("undecided", sentence)]
+        sentence = "the tests permit other values of the parameters"
+        if names:
+            share = 100.0 * sum(one.probability for one in others)
+            sentence = f"the prediction uses {used}, but {' or '.join(names)} may be present (together {share:.0f} %)"
+        return [Caveat("undecided", f"{sentence}: the bands, low to high, include each alternative")]
 
     @property
     def fitted_places(self) -> list[Place]:
