@@ -217,7 +217,7 @@ def read_csv_entries(path: Path) -> list[Entry]:
                 place=f"line {number}",
                 found=str(error),
                 expected="one line for each bushing, and quotes in pairs",
-                hint="a quote that belongs to a name is written twice, in a cell in quotes",
+                hint='for a name with a quote, write the quote twice and put the cell in quotes: "Rear ""soft"""',
             ) from None
         if any(cells):
             filled.append((number, cells))

@@ -339,12 +339,12 @@ class Result:
         """Warning that the tests do not rule out other models, in a list; empty if they do."""
         if not self.alternatives:
             return []
-        others = [one for one in self.alternatives if not {*one.model.effects} <= {*self.model.effects}]
-        names = dict.fromkeys(name for one in others for name in one.model.effects if name not in self.model.effects)
+        rivals = [one for one in self.alternatives if not {*one.model.effects} <= {*self.model.effects}]
+        names = dict.fromkeys(name for one in rivals for name in one.model.effects if name not in self.model.effects)
         used = "a smooth correction" if self.model.unnamed else "the most probable model"
         sentence = "the tests permit other values of the parameters"
         if names:
-            share = 100.0 * sum(one.probability for one in others)
+            share = 100.0 * sum(one.probability for one in rivals)
             sentence = f"the prediction uses {used}, but {' or '.join(names)} may be present (together {share:.0f} %)"
         return [Caveat("undecided", f"{sentence}: the bands, low to high, include each alternative")]
 
