@@ -104,12 +104,12 @@ def test_limits_decide_the_exit_status_and_are_named(typed, shop):
     typed("batch", PATTERN, "-o", "all", "--no-plots", "-q")
     middle = sorted(float(row["mu [MPa]"]) for row in rows(shop / "all"))[2]
     (shop / "limits.toml").write_text(f'[parameters.mu]\nmax = "{1.1 * middle} MPa"\n')
-    typed(
-        "batch", PATTERN, "-o", "all", "--no-plots", "--resume", "--limits", "limits.toml", "--junit", "r.xml", status=1
-    )
+    more = ("--resume", "--limits", "limits.toml", "--junit", "r.xml")
+    done = typed("batch", PATTERN, "-o", "all", "--no-plots", *more, status=1)
     table = rows(shop / "all")
     over = [float(row["mu [MPa]"]) > 1.1 * middle for row in table]
     assert 0 < sum(over) < 5
+    assert f"batch: {sum(over)} of 5 parts fail" in done.text
     assert ["fail" in row["limits"] for row in table] == over
     assert all(row["missed limits"].startswith("mu ") == bad for row, bad in zip(table, over, strict=True))
     (suite,) = JUnitXml.fromfile(str(shop / "r.xml"))

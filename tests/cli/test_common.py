@@ -51,17 +51,6 @@ def test_json_alone_on_standard_output_and_quiet_is_quiet(bushfit, tmp_path, arg
     assert not any(line for line in loud.stderr.splitlines() if not re.match("warning: |  ", line))
 
 
-@pytest.mark.parametrize(("case", "condition"), [("practice/case_001", True), (None, False)])
-def test_a_plan_promises_parameters_only_if_the_model_were_right(bushfit, root, tmp_path, case, condition):
-    source = root / "data" / case / "bushing.toml" if case else "model/model.json"
-    printed = bushfit("plan", source, "--hours", "1", "--target", "mu=50 %", "-o", tmp_path / "x").stdout
-    rows = [line for line in printed.splitlines() if line.split(",")[0].split() in (["mu"], ["sigma_fmax"])]
-    assert condition == (len([row for row in rows if ", without model error" in row]) >= 2)
-    assert condition == ("met, without model error" in printed)
-    assert condition == ("stiffness, axial, with model error" in printed)
-    assert condition == ("standard error of the stiffness, with model error: axial" in printed)
-
-
 @pytest.mark.parametrize(
     ("arguments", "file"),
     [

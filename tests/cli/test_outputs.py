@@ -237,6 +237,9 @@ def test_a_command_shows_what_it_writes_and_keeps_what_it_reads(folder, tmp_path
     assert {Path(test).name for test in tests} <= {file.name for file in found.inputs}
     assert name == "predict" or misprinted(found) == []
     assert [line for line in misquoted(found) if not re.search(WORKED_OUT.get(name, "$^"), line)] == []
+    for figure in found.figures.values():
+        places = [axes.get_position().bounds for axes in figure.axes]
+        assert len({*places}) == len(places), "no panel lies on another"
     wrong, unknown = misdrawn(found)
     assert wrong == []
     assert [axes for axes in unknown if not re.search(DERIVED.get(name, "$^"), axes)] == []

@@ -141,6 +141,9 @@ def test_bands_hold_each_model_that_may_be_right(measured):
     assert found.verdict == "ambiguous"
     result = found.result
     assert len(result.alternatives) > 1
+    probabilities = [each.probability for each in result.alternatives]
+    assert min(probabilities) >= 0.025
+    assert sum(probabilities) <= 1.0
     band = predict(result, Direction.RADIAL, FREQUENCIES, AMPLITUDES).stiffness
     for each in result.alternatives:
         there = radial(each.model)

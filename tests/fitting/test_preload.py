@@ -26,7 +26,6 @@ from bushfit.diagnosis.record import DiagnosisSettings
 from bushfit.diagnosis.workflow import diagnose
 from bushfit.errors import ModelError
 from bushfit.fitting.prepared_campaign import PreparedCampaign
-from bushfit.fitting.procedures import fit_joint
 from bushfit.geometry import Bushing, Direction, stiffness_per_modulus, unit_strain
 from bushfit.model.file import from_document, to_document
 from bushfit.prediction.static_curve import static_curve
@@ -173,16 +172,6 @@ def test_two_preloads_that_differ_in_sense_give_a_line_and_one_is_a_label():
     assert any(
         "axial: 2 preloads, -1 to 1 mm: the model follows a straight line" in line for line in map(str, result.warnings)
     )
-
-
-def test_a_preload_without_influence_is_a_sentence_and_can_be_predicted():
-    data = PreparedCampaign.from_campaign(campaign(Rubber(), newtons(0.0, 500.0, 1000.0), seed=2))
-    result = fit_joint(data)
-    assert any("show no influence of the preload" in line for line in map(str, result.warnings))
-    without, loaded = (
-        predict(result, Direction.AXIAL, [20.0], [1e-4], preload=preload) for preload in (None, Preload(700.0, "N"))
-    )
-    assert loaded.stiffness.value == without.stiffness.value
 
 
 def test_only_tested_preloads_are_predicted_also_from_the_model_file():

@@ -1,9 +1,7 @@
 """Coupons and mounts beside the bushing, or alone: which tests are fitted, from where, and with which effects.
 
-And tests at several temperatures: one fit of all, its shift factors, and what it predicts between and beyond. The rig
-steps through time, so that the closed form of the fit made none of the data; both have the shift factors from one
-formula, which tests/effects/test_limits.py holds against the constants of Williams, Landel and Ferry. That sweeps which
-follow another law are told apart from it, a test here says.
+And that a sweep which does not follow the law of temperature is told apart; tests/cli/test_laboratory.py has shift
+factors and predictions where it does, tests/effects/test_limits.py the constants of Williams, Landel and Ferry.
 """
 
 from dataclasses import replace
@@ -16,7 +14,7 @@ from fits import joint_fit
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import FitSettings
 from bushfit.campaign.simulated import SimulatedLoop, SimulatedSweep, SimulateSettings
-from bushfit.commands.fit import campaign_files, fit
+from bushfit.commands.fit import fit
 from bushfit.diagnosis.workflow import diagnose
 from bushfit.effects import BASE
 from bushfit.errors import ModelError
@@ -25,10 +23,8 @@ from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.procedures import fit_joint
 from bushfit.geometry import Direction, Place, Specimen
 from bushfit.model.model import Model
-from bushfit.prediction.stiffness import predict
 from bushfit.reading.measurement import Stepped, Sweep
-from bushfit.simulation.measured import measure, simulate
-from bushfit.simulation.undisturbed import Undisturbed, undisturbed
+from bushfit.simulation.measured import simulate
 from bushfit.units import CELSIUS
 
 DMA = Specimen("DMA", "modulus")
@@ -41,7 +37,6 @@ BAND = tuple(np.geomspace(1.0, 100.0, 7).tolist())
 SWEEPS = tuple(
     SimulatedSweep(Direction.AXIAL, (1e-4, 5e-4), BAND, temperature=CELSIUS + degrees) for degrees in DEGREES
 )
-SEEDS = 12
 
 
 def sweep(
@@ -103,60 +98,6 @@ PLAN = SimulateSettings(
 @pytest.fixture(scope="module")
 def truth(paper_model) -> Model:
     return paper_model.with_effect("temperature", VALUES)
-
-
-@pytest.fixture(scope="module")
-def clean(truth) -> Undisturbed:
-    return undisturbed(truth, PLAN)
-
-
-def test_all_temperatures_are_fitted_at_once(clean, truth):
-    """From what is read off the tests: the shift within its interval as often as it claims, and a stiffness between."""
-    off, inside, bands, warm = [], 0, 0, CELSIUS + 30.0
-    for seed in range(SEEDS):
-        data = PreparedCampaign.from_campaign(measure(clean, replace(PLAN, seed=seed)).campaign())
-        result = fit_joint(data, effects=(*BASE, "temperature"))
-        assert not [line for line in map(str, result.warnings) if "degC" in line]
-        low, high = result.interval("temperature.shift") or (0.0, 0.0)
-        off.append(result.model.values["temperature.shift"] / VALUES["temperature.shift"] - 1.0)
-        inside += low < VALUES["temperature.shift"] < high
-        found = predict(result, Direction.AXIAL, [30.0], [2e-4], temperature=warm).stiffness
-        true = predict(replace(result, model=truth), Direction.AXIAL, [30.0], [2e-4], temperature=warm).stiffness
-        bands += bool(found.low[0] < true.value[0] < found.high[0])
-        assert found.value[0] == pytest.approx(true.value[0], rel=0.01)
-    assert np.max(np.abs(off)) < 0.05
-    assert min(inside, bands) >= SEEDS - 2  # 11.4 are expected; 3 misses or more come once in 50
-
-
-def test_shift_factors_are_those_of_the_law_where_it_holds(clean):
-    data = PreparedCampaign.from_campaign(measure(clean, PLAN).campaign())
-    result = fit_joint(data, effects=(*BASE, "temperature"))
-    found = master_curve(result, data.sweeps)
-    assert [round(each.temperature - CELSIUS) for each in found] == list(DEGREES)
-    off = [(each.best_shift[0] - each.shift[0]) / np.hypot(each.best_shift[1], each.shift[1] + 1e-3) for each in found]
-    assert np.max(np.abs(off)) < 3.5
-    for each in found:
-        line = result.model.stiffness(Direction.AXIAL, each.reduced_frequency, each.sweep.amplitude)
-        assert np.max(np.abs(each.reduced_stiffness / line - 1.0)) < 0.02
-    tables = {file.name: file for file in campaign_files(data, result) if file.kind == "table"}
-    factors, curve = (tables[name].content() for name in ("shift_factors", "master_curve"))
-    assert len(factors) == len(DEGREES)
-    assert len(curve) == sum(each.sweep.frequency.size for each in found)
-    assert factors["log10 a_T [-]"].to_numpy() == pytest.approx([each.shift[0] / np.log(10.0) for each in found])
-    own = (
-        factors[
-            [
-                "log10 a_T of the sweep alone [-]",
-                "log10 a_T of the sweep alone [-], low",
-                "log10 a_T of the sweep alone [-], high",
-            ]
-        ]
-        .to_numpy()
-        .T
-    )
-    half = [1.96 * each.best_shift[1] / np.log(10.0) for each in found]
-    assert own[0] - own[1] == pytest.approx(half, rel=1e-3)
-    assert own[2] - own[0] == pytest.approx(half, rel=1e-3)
 
 
 def test_a_sweep_off_the_law_says_so(truth):

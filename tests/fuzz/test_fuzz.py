@@ -1,4 +1,4 @@
-"""Any bytes are a table, a campaign or a model file, or one clear error: kept inputs, random ones, and bombs."""
+"""Any bytes are a table, a campaign or a model file, or one clear error: kept inputs, and random ones."""
 
 import shutil
 from pathlib import Path
@@ -63,27 +63,6 @@ def test_the_corpus(name, tmp_path):
 def test_mutated_files_and_options(command, tmp_path):
     _, found = faults(command, range(15), tmp_path / "work")
     assert found == []
-
-
-#: Each took minutes or gigabytes in a parser that is not told to stop.
-BOMBS = {
-    "a key of 400 000 parts.toml": "[" + ".".join("a" * 400_000) + "]",
-    "a quoted key of 200 000 parts.toml": ".".join(['"a"'] * 200_000) + " = 1",
-    "half a million brackets.toml": "a = " + "[" * 500_000,
-    "300 000 tables in one line.toml": "a = " + "{ a = " * 150_000,
-    "a number of 900 000 digits.toml": BUSHING + "a = " + "9" * 900_000,
-    "190 000 wrong values.toml": BUSHING + "[predict]\nfrequencies = [" + '"5",' * 190_000 + "]",
-    "five million brackets.json": "[" * 5_000_000,
-    "a million objects.json": '{"a":' * 1_000_000,
-    "a number of nine million digits.json": '{"schema": ' + "9" * 9_000_000 + "}",
-}
-
-
-@pytest.mark.parametrize("name", BOMBS)
-def test_a_bomb_is_refused(name, tmp_path):
-    (tmp_path / name).write_text(BOMBS[name])
-    with pytest.raises(BushfitError):
-        (load_result if name.endswith("json") else load_campaign)(tmp_path / name)
 
 
 @pytest.mark.parametrize(("name", "load"), [("x.toml", load_campaign), ("x.json", load_result)])

@@ -13,7 +13,7 @@ from bushfit.campaign.simulated import SimulatedLoop, SimulatedSweep, SimulateSe
 from bushfit.commands.compare import compare as compare_results
 from bushfit.commands.compare import compared_result
 from bushfit.effects.contract import Array
-from bushfit.geometry import Bushing, Direction
+from bushfit.geometry import Direction
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import FIVE, Model
 from bushfit.model.result import Range, Result
@@ -190,13 +190,3 @@ def test_the_warning_names_the_result_that_is_extrapolated(paper_model):
         line.startswith("B: axial: predicted at frequencies of 5 to 155 Hz") for line in map(str, output.warnings)
     )
     assert not any(line.startswith("A: axial: predicted") for line in map(str, output.warnings))
-
-
-def test_another_shape_is_compared_at_the_same_displacement(paper_model):
-    """Twice the length, twice the stiffness, and the same material."""
-    longer = replace(paper_model, bushing=Bushing("longer", 0.010, 0.018, 0.068))
-    (pair,) = compare_results(
-        *(mu_alone(model, (1.0, 155.0), (1e-4, 1e-3)) for model in (paper_model, longer))
-    ).comparisons
-    np.testing.assert_allclose(np.expm1(pair.contrasts[0].stiffness.value), 1.0)
-    assert [row.difference for row in pair.parameters if row.difference is not None] == [0.0]

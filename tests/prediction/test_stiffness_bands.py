@@ -143,16 +143,6 @@ def test_a_band_that_lacks_the_error_of_a_formula_says_so(result, bushing, direc
     assert all(part in line.text for part, line in zip(said, found, strict=True)), found
 
 
-def test_default_grid_is_the_papers_within_the_measured_range(result):
-    frequencies, amplitudes = default_grid(result, Direction.AXIAL)
-    assert (tuple(frequencies), tuple(amplitudes)) == (PAPER_FREQUENCIES, PAPER_AMPLITUDES)
-    narrow = replace(result, measured=Range((20.0, 80.0), result.measured.strain))  # type: ignore[union-attr]
-    assert default_grid(narrow, Direction.AXIAL)[0].tolist() == [25.0, 35.0, 45.0, 55.0, 65.0, 75.0]
-    tiny = replace(result, measured=Range((5.0, 155.0), (1e-6, 1e-5)))
-    assert default_grid(tiny, Direction.AXIAL)[1].size == 3
-    assert predict(tiny, Direction.AXIAL, *default_grid(tiny, Direction.AXIAL)).warnings == ()
-
-
 def test_a_resonance_says_what_its_peak_extrapolates(result):
     """Frequencies and strains near the peak count, not those far from it; so does a place that was not fitted."""
     inside = predict_resonance(result, Direction.AXIAL, 3.0, 20.0, None)

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any, get_args
 from xml.etree import ElementTree
 
-import numpy as np
 import openpyxl
 import pytest
 from matplotlib.figure import Figure
@@ -24,7 +23,6 @@ from bushfit.errors import CONTROL, OutputError
 from bushfit.geometry import Specimen
 from bushfit.report.plots.style import to_image
 from bushfit.report.results import Formats, Picture, ResultFile, encode_all, place_names, write_results
-from bushfit.report.tables import loops_table, sweeps_table
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="processes are forked and killed")
 
@@ -167,25 +165,6 @@ def test_a_picture_is_the_same_bytes_each_time_without_date_or_version(form):
         names = {element.tag.partition("}")[2] for element in ElementTree.fromstring(first).iter()}
         assert {"path", "use"} <= names
         assert not {"script", "text", "image"} & names
-
-
-def test_loops_row_by_row_and_sweeps_by_amplitude_repeat_and_frequency(measured, paper_model):
-    table, loop = loops_table(paper_model, measured.loops), measured.loops[0].test
-    assert len(table) == loop.time.size
-    np.testing.assert_allclose(table["force [N]"], loop.force, rtol=1e-12)
-    np.testing.assert_allclose(table["displacement [mm]"], 1e3 * loop.displacement, atol=2e-3)
-    off = (table["force [N]"] - table["model force [N]"]) / measured.loops[0].noise
-    np.testing.assert_allclose(table["residual [noise]"], off, rtol=1e-9, atol=1e-9)
-    assert np.std(table["residual [noise]"]) == pytest.approx(1.0, abs=0.1)
-    table = sweeps_table(paper_model, measured.sweeps)
-    assert len(table) == sum(data_set.test.frequency.size for data_set in measured.sweeps)
-    assert list(dict.fromkeys(table["direction"])) == ["axial", "radial"]
-    axial = table[table["direction"] == "axial"].reset_index(drop=True)
-    frequency, amplitude = axial[["frequency [Hz]", "amplitude [mm]"]].to_numpy().T
-    assert axial.equals(axial.sort_values(["amplitude [mm]", "repeat", "frequency [Hz]"], ignore_index=True))
-    stiffness = paper_model.stiffness("axial", frequency, amplitude / 1e3)
-    np.testing.assert_allclose(axial["model stiffness [N/mm]"], np.abs(stiffness) / 1e3, rtol=1e-12)
-    np.testing.assert_allclose(axial["model loss factor [-]"], stiffness.imag / stiffness.real, rtol=1e-9)
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bushfit.campaign.campaign import load_campaign
-from bushfit.campaign.simulated import SimulatedLoop, SimulatedResonance, SimulatedSweep, SimulateSettings
+from bushfit.campaign.simulated import SimulatedLoop, SimulatedSweep, SimulateSettings
 from bushfit.effects import BASE, LIBRARY, History, get_effect, qualified_name
 from bushfit.geometry import Direction, Specimen
 from bushfit.model.model import Model
@@ -19,10 +19,8 @@ LOOP = SimulatedLoop(Direction.AXIAL, 1e-3, 0.1, cycles=2)
 SWEEP = SimulatedSweep(Direction.AXIAL, (1e-4, 5e-4), (5.0, 50.0, 155.0))
 PLAN = SimulateSettings(loops=(LOOP,), sweeps=(SWEEP,))
 COUPON = Specimen("DMA", "modulus")
-MOUNT = Specimen("mount", "shear", area=772e-6, thickness=6e-3, elements=2)
 STRAINS = tuple(np.geomspace(1e-3, 0.1, 12).tolist())
 STRAIN_SWEEP = SimulatedSweep(COUPON, STRAINS, (1.0, 10.0, 100.0), stepped="amplitude", reached=0.02)
-SHAKEN = SimulatedResonance(MOUNT, 0.25, 9.81, tuple(np.linspace(60.0, 600.0, 40).tolist()))
 
 
 @pytest.fixture(scope="module")
@@ -128,14 +126,3 @@ def test_an_amplitude_sweep_has_the_stiffness_at_the_amplitudes_reached(coupon):
     assert np.abs(sweep.stiffness[some] / itself - 1.0).max() < 2e-5
     closed = coupon.truth.stiffness(COUPON, sweep.frequency, sweep.amplitude_reached)
     np.testing.assert_allclose(sweep.stiffness, closed, rtol=2e-3)
-
-
-def test_a_resonance_test_reduces_to_the_stiffness_at_the_amplitude_reached(paper_model):
-    plan = SimulateSettings(resonances=(SHAKEN, replace(SHAKEN, direction=Direction.RADIAL, mass=1.5)))
-    simulated = simulate(paper_model.with_effect("force_gain", {"force_gain.loops": 0.1}), plan)
-    assert [test.name for _, test in simulated.resonances] == ["resonance_mount", "resonance_radial"]
-    for sweep in simulated.campaign().sweeps:
-        assert sweep.stepped is None
-        assert np.ptp(np.log(sweep.amplitude)) > np.log(5.0)
-        closed = paper_model.stiffness(sweep.direction, sweep.frequency, sweep.amplitude)
-        np.testing.assert_allclose(sweep.stiffness, closed, rtol=2e-3)

@@ -258,6 +258,14 @@ def without_column(name: str, header: str) -> Spoil:
     return lambda folder: pd.read_csv(folder / name).rename(columns={header: "else"}).to_csv(folder / name, index=False)
 
 
+def without_rows(folder: Path) -> None:
+    """A comparison whose tables are empty."""
+    document = json.loads((folder / "compare.json").read_text(encoding="utf-8"))
+    for columns in document["pairs"][0]["places"].values():
+        columns.update({header: [] for header in columns})
+    (folder / "compare.json").write_text(json.dumps(document), encoding="utf-8")
+
+
 #: Spoiled folders of results, comparisons and batches, and the words of the error.
 SPOILED: dict[str, list[tuple[Spoil, tuple[str, ...]]]] = {
     "results": [
@@ -289,6 +297,7 @@ SPOILED: dict[str, list[tuple[Spoil, tuple[str, ...]]]] = {
         (changed("compare.json", schema="bushfit/compare/9"), ("compare.json, schema", "bushfit/compare/1")),
         (changed("compare.json", pairs=7), ("compare.json, pairs",)),
         (changed("compare.json", pairs=[]), ("compare.json, pairs",)),
+        (without_rows, ("columns are missing, empty or of unequal length",)),
         (written("compare.html", "mine"), ("that bushfit did not write", "compare.html")),
     ],
     "batch": [

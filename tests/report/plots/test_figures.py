@@ -15,6 +15,7 @@ from figures import (
     sweeps,
     whole,
 )
+from matplotlib.colors import to_rgba
 from tries import some
 
 from bushfit.geometry import Direction
@@ -54,6 +55,8 @@ def test_sweeps_of_many_amplitudes(paper_model, swept, count):
         names = [tick.get_text() for tick in bar.get_yticklabels()]
         assert len(names) == 8
         assert (names[0], names[-1], bar.get_title()) == ("0.02 mm", "1 mm", "amplitude")
+        drawn = points(figure.axes[0])[0].get_color()
+        np.testing.assert_allclose(bar._colorbar.mappable.to_rgba(0), to_rgba(drawn), err_msg="of the smallest")
     else:
         assert len(legend(figure.axes[1])) == count
     whole(gap(paper_model, paper_model, [data_set]), apart=False)
