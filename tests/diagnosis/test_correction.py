@@ -233,6 +233,27 @@ def test_laws_are_found_with_their_phase_and_powers(law, words, measured, fitted
     assert words in found.sentence
 
 
+@pytest.mark.parametrize(
+    ("units", "phase", "power", "words"),
+    [
+        (("stiffness",), 90.0, 1.0, ("more loss", "acts like a damper")),
+        (("stiffness",), -90.0, 1.0, ("less loss",)),
+        (("gain", "stiffness"), 90.0, 1.0, ("acts like a damper or a delay of the displacement",)),
+        (("stiffness",), 93.6, 1.0, ("more loss (phase 94 deg)",)),
+        (("stiffness",), 180.0, 2.0, ("less stiffness", "grows as f^2", "acts like a mass")),
+    ],
+)
+def test_a_law_is_called_what_its_phase_and_powers_act_like(units, phase, power, words):
+    """Of one standard error of the phase each; a law 3.6 of them away has no name."""
+    ends = (phase - 1.96, phase + 1.96)
+    law = PowerLaw(
+        units[0], units[1:], (phase, *ends), (power, power - 0.1, power + 0.1), (0.0, -0.1, 0.1), is_likely=True
+    )
+    for each in words:
+        assert each in law.sentence
+    assert ("acts like" in law.sentence) == any("acts like" in each for each in words)
+
+
 def test_what_nearly_all_explanations_contain_is_tested_next_if_the_rig_may_have_it(measured):
     campaign = with_relaxation(measured({"rig_compliance": {"compliance": 8e-8}}, TURNED), 0.04)
     found = asked(replace(campaign, rig=RigSettings(gain_error=5e-4, phase_error=5e-4)))
