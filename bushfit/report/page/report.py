@@ -148,7 +148,8 @@ def draw_figures(
     # file name, heading, function and its arguments
     figures: list[tuple[str, str, Callable[..., Chart], tuple[Any, ...]]] = []
     for name, prediction in [*predictions.items()][:_MOST_PLACES]:
-        heading = f"{prediction.direction}: prediction{' and measurement' * (prediction.measured is not None)}"
+        is_measured = sweeps is not None and str(prediction.direction) in {*sweeps["direction"]}
+        heading = f"{prediction.direction}: prediction{' and measurement' * is_measured}"
         figures.append((name, heading, plots.prediction.prediction_figure, (result, prediction, sweeps, title)))
     if gap is not None and diagnosis is not None:
         figures.append(("gap", "Measured minus model", plots.gap.gap_figure, (gap, result, diagnosis, title)))
