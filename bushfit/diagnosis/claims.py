@@ -12,6 +12,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy.ndimage import zoom
 
 from bushfit.caveat import Caveat
 from bushfit.effects import BASE
@@ -28,6 +29,8 @@ from bushfit.reading.measurement import Loop, Sweep
 _ALPHA = np.linspace(0.05, 0.6, 10)
 #: Values of eps_half that are tried before any fit: those of all filled rubbers, with a margin of a factor of 2.
 _EPS_HALF = np.geomspace(2e-4, 0.2, 24)
+#: Number of steps into which a cubic spline divides each step of this grid, to find the smallest misfit.
+_FINER = 8
 #: Least relative error of a point before any fit: the error of the grid of values.
 _COARSE = 1e-3
 #: Maximum number of points of a test that are used before any fit: enough to show the shape of its curves.
@@ -239,7 +242,8 @@ class ClaimScreening:
         scale = np.sqrt(np.einsum("gii->gi", gram)) + 1e-300
         unit, right = gram / scale[:, :, None] / scale[:, None, :] + _RIDGE * np.eye(3), products / scale
         explained = np.einsum("gi,gi->g", right, np.linalg.solve(unit, right[..., None])[..., 0])
-        return max(_paraboloid_minimum((total - explained).reshape(_EPS_HALF.size, _ALPHA.size)), 0.0)
+        misfits = (total - explained).reshape(_EPS_HALF.size, _ALPHA.size)
+        return max(float(zoom(misfits, _FINER).min()), 0.0)
 
     def _test_products(
         self, index: int, data_set: MeasuredTest, mistake: Mistake | None, bushing: Bushing | None
@@ -285,31 +289,6 @@ class ClaimScreening:
             shape = alpha.size, frequency.size
             self._responses[key] = np.stack([np.broadcast_to(response, shape) for response in responses], axis=1)
         return self._responses[key]
-
-
-def _paraboloid_minimum(misfit: Array) -> float:
-    """Estimate the minimum of a sum of squares from its values on a grid, by a paraboloid about the smallest value.
-
-    Args:
-        misfit: sum of squares on a grid of alpha and eps_half, in units of a coarse noise, (rows, columns).
-
-    Returns:
-        Minimum of the paraboloid inside the fitted grid cells; the smallest grid value if the paraboloid has no
-        minimum.
-    """
-    row, column = (
-        int(np.clip(i, 1, n - 2))
-        for i, n in zip(np.unravel_index(int(np.argmin(misfit)), misfit.shape), misfit.shape, strict=True)
-    )
-    y, x = (axis.ravel() for axis in np.mgrid[-1:2, -1:2])
-    near = misfit[row - 1 : row + 2, column - 1 : column + 2].ravel()
-    terms = np.stack((np.ones(9), x, y, x**2, x * y, y**2), axis=1)
-    _, *slope, xx, xy, yy = np.linalg.lstsq(terms, near, rcond=None)[0].tolist()
-    if xx <= 0.0 or 4.0 * xx * yy <= xy**2:
-        return float(near.min())
-    step = np.clip(np.linalg.solve([[2.0 * xx, xy], [xy, 2.0 * yy]], np.negative(slope)), -1.0, 1.0)
-    fall = float(np.dot(slope, step) + xx * step[0] ** 2 + xy * step[0] * step[1] + yy * step[1] ** 2)
-    return float(near[4]) + min(fall, 0.0)
 
 
 def _corrected_points(data_set: MeasuredTest, mistake: Mistake | None) -> tuple[Place, Array, Array, Array, Array]:
