@@ -59,33 +59,38 @@ class EffectEntry(TypedDict):
     alternatives: list[str]
 
 
-#: Some keys contain a unit that is not a valid Python name, so this type is created by a call.
-MisfitRegionEntry = TypedDict(
-    "MisfitRegionEntry",
+#: Keys of a region whose units are no Python names.
+_RegionKeys = TypedDict(
+    "_RegionKeys",
     {
-        "direction": Annotated[str, Field(description="direction of the bushing, or name of a specimen.")],
-        "kind": Annotated[Literal["sweep", "loop"], Field(description="kind of the tests in this region.")],
         "frequency_Hz": Annotated[list[float], Field(description="lowest and highest frequency [Hz].")],
-        "amplitude_mm": NotRequired[
-            Annotated[list[float], Field(description="smallest and largest zero-to-peak displacement [mm].")]
-        ],
-        "amplitude_deg": NotRequired[
-            Annotated[list[float], Field(description="smallest and largest zero-to-peak rotation [deg].")]
-        ],
         "amplitude_%": NotRequired[
             Annotated[list[float], Field(description="smallest and largest zero-to-peak strain [%].")]
         ],
-        "component": Annotated[
-            Literal["storage", "loss", "force"],
-            Field(description="storage or loss stiffness of sweeps, or force of a loop."),
-        ],
-        "excess": Annotated[
-            float, Field(description="root mean square of the smooth misfit in the region, in units of its noise.")
-        ],
-        "reading": Annotated[str, Field(description="description of the region as a sentence.")],
     },
 )
-MisfitRegionEntry.__doc__ = "One region in which model and measurement disagree."
+
+
+class MisfitRegionEntry(_RegionKeys):
+    """One region in which model and measurement disagree.
+
+    Args:
+        direction: direction of the bushing, or name of a specimen.
+        kind: kind of the tests in this region.
+        amplitude_mm: smallest and largest zero-to-peak displacement [mm].
+        amplitude_deg: smallest and largest zero-to-peak rotation [deg].
+        component: storage or loss stiffness of sweeps, or force of a loop.
+        excess: root mean square of the smooth misfit in the region, in units of its noise.
+        reading: description of the region as a sentence.
+    """
+
+    direction: str
+    kind: Literal["sweep", "loop"]
+    amplitude_mm: NotRequired[list[float]]
+    amplitude_deg: NotRequired[list[float]]
+    component: Literal["storage", "loss", "force"]
+    excess: float
+    reading: str
 
 
 class BeforeAfter(TypedDict):
