@@ -6,13 +6,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import reduce
 
 import numpy as np
 
 from bushfit.caveat import Caveat
-from bushfit.diagnosis.described import GapDescription, describe
+from bushfit.diagnosis.closing import Closing, close_gap, with_free_gains
 from bushfit.diagnosis.document import Verdict
 from bushfit.diagnosis.explanation_text import (
     causes_text,
@@ -22,9 +22,9 @@ from bushfit.diagnosis.explanation_text import (
     probability_text,
     undecided_text,
 )
-from bushfit.diagnosis.fits import fit_model, result_of
+from bushfit.diagnosis.fits import result_of
 from bushfit.diagnosis.holdout import HoldOut, hold_out
-from bushfit.diagnosis.hypotheses import Hypothesis, mean_parameters
+from bushfit.diagnosis.hypotheses import Hypothesis
 from bushfit.diagnosis.locate import find_regions
 from bushfit.diagnosis.next_test import MEASURE_AGAIN, deciding_test
 from bushfit.diagnosis.priors import LARGEST_CLOSED_GAP, NAMED
@@ -35,9 +35,7 @@ from bushfit.diagnosis.verdict import LEVELS, NAMELESS, Composition, Finding, de
 from bushfit.effects import get_effect, get_parameter, qualified_name
 from bushfit.effects.mistakes import get_mistake
 from bushfit.effects.unnamed import NAME as UNNAMED
-from bushfit.fitting.preparation import split_by_kind, with_gain_weighting
 from bushfit.fitting.problem import FitResult
-from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.units import number
@@ -54,28 +52,6 @@ _LEVELS_ADVICE = "measure the levels again in another session, or state the clas
 
 
 @dataclass(frozen=True, eq=False)
-class Closing:
-    """Fitted model that closes the gap between model and tests as far as possible.
-
-    Args:
-        certain: fit of the starting model with the effects that are certain.
-        known: covariance of the amounts of effects that the fit kept fixed; None without any.
-        gap: smooth correction of the model for the rest of the gap, with its description; None without a correction.
-        holdout: residuals of held-out tests, if they were needed to decide on a correction; else None.
-    """
-
-    certain: FitResult
-    known: Covariance | None = None
-    gap: GapDescription | None = None
-    holdout: HoldOut | None = None
-
-    @property
-    def fit(self) -> FitResult:
-        """Model that closes the gap: with the certain effects, and with the smooth correction if there is one."""
-        return self.gap.after if self.gap else self.certain
-
-
-@dataclass(frozen=True, eq=False)
 class DiagnosisWriter:
     """Builder of the reported diagnosis from the verdict of a search.
 
@@ -83,12 +59,13 @@ class DiagnosisWriter:
         search: completed search, with the tests and the starting model fitted to them.
         finding: verdict on the hypotheses, with the explanations to report.
         hypotheses: all hypotheses that were compared, the most probable first.
+        base: fit of the starting model without the assumed gain errors of loops, see `with_free_gains`.
     """
 
     search: Search
     finding: Finding
     hypotheses: Sequence[Hypothesis]
-    _refitted: dict[FitResult, FitResult] = field(default_factory=dict)
+    base: FitResult
 
     @property
     def first(self) -> Composition | None:
@@ -99,11 +76,11 @@ class DiagnosisWriter:
         """Return the diagnosis with all texts: verdict, effects, regions, hold-out, next test, model to use."""
         first, verdict = self.first, self.finding.verdict
         if first is None:
-            return self._build(Closing(self._with_free_gains(self.search.base)), _NOTHING)
+            return self._build(Closing(self.base), _NOTHING)
         mistakes = {composition.best.claim and composition.best.claim.key for composition in self.finding.reported}
         if verdict in ("named", "partly", "ambiguous") and first.best.claim and len(mistakes) == 1:
             return self._record_diagnosis(first)
-        closing = self._close_gap(first)
+        closing = close_gap(self.search, self.finding, self.hypotheses, self.base)
         if verdict in ("named", "partly"):
             diagnosis = self._named_diagnosis(first, closing)
             revised = self._revised_finding(diagnosis, closing.holdout)
@@ -116,68 +93,9 @@ class DiagnosisWriter:
             else self._nameless_diagnosis(first, closing)
         )
 
-    def _close_gap(self, first: Composition) -> Closing:
-        """Fit the effects that are certain, and correct the model for the rest of the gap by a smooth function.
-
-        The model is not corrected if the effects close the gap, or if tests may be faulty or wrongly recorded. The
-        amounts of effects may then be distorted, so held-out tests are predicted with and without them.
-        """
-        verdict, search, reported = self.finding.verdict, self.search, self.finding.reported
-        may_be_wrong = {
-            "partly": first.best.levels,
-            "ambiguous": any(composition.faulty_parts or composition.best.claim for composition in reported),
-        }
-        fit, known = self._fit_certain(first)
-        base, fit, gap = self._with_free_gains(search.base), self._with_free_gains(fit), None
-        if search.settings.max_effects and verdict not in ("named", "unexplained") and not may_be_wrong.get(verdict):
-            rig, has_candidates = search.data.campaign.rig, verdict == "ambiguous"
-            gap = describe(fit, rig, search.start, search.data.bounds, before=base, has_candidates=has_candidates)
-        is_compared = verdict == "named" or (verdict == "ambiguous" and self.finding.names and not gap)
-        return Closing(fit, known, gap, hold_out(base, fit, search.data.bounds) if is_compared else None)
-
-    def _fit_certain(self, first: Composition) -> tuple[FitResult, Covariance | None]:
-        """Fit the starting model with the effects of an explanation that are certain.
-
-        Args:
-            first: the explanation. If it also contains a smooth deviation of the rubber, the amounts of the effects are
-                fixed at their posterior means, because a fit without the deviation would distort them.
-
-        Returns:
-            The fit, and the covariance of the amounts that were fixed; None if all were fitted.
-        """
-        base, bounds, names = self.search.base, self.search.data.bounds, self.finding.names
-        refitted = [h for h in self.hypotheses if h.refitted and not h.claim and set(h.effects) >= set(names)]
-        if not names or not refitted:
-            return base, None
-        if not first.unnamed:
-            state = min((h.state for h in refitted), key=lambda state: len(state.effects) > len(names))
-            model = state.fit.model.without(*{*state.effects} - {*names})
-            return fit_model(model, base.data_sets, base.fixed, bounds), None
-        model = base.model
-        for name in names:
-            model = model.with_effect(name)
-        added, known = mean_parameters(refitted, [name for name in model.values if name not in base.model.values])
-        return fit_model(model.with_values(added), base.data_sets, [*base.fixed, *added], bounds), known
-
-    def _with_free_gains(self, fit: FitResult) -> FitResult:
-        """Refit a model without the gain error of loops that bushfit assumes if the campaign states none."""
-        loops = split_by_kind(fit.data_sets)[0]
-        gain_is_stated = self.search.data.campaign.rig.stiffness_errors[0] is not None
-        if gain_is_stated or not any(loop.gain_weighs for loop in loops):
-            return fit
-        if fit not in self._refitted:
-            data_sets = with_gain_weighting(fit.data_sets, weigh=False)
-            self._refitted[fit] = fit_model(fit.model, data_sets, fit.fixed, self.search.data.bounds)
-        return self._refitted[fit]
-
     def _named_diagnosis(self, first: Composition, closing: Closing) -> Diagnosis:
         """Diagnosis in which named effects explain the gap, or part of it with a description of the rest."""
-        names, base, fit, gap = (
-            self.finding.names,
-            self._with_free_gains(self.search.base),
-            closing.certain,
-            closing.gap,
-        )
+        names, base, fit, gap = self.finding.names, self.base, closing.certain, closing.gap
         verbs = ("closes", "explains") if len(names) == 1 else ("close", "explain")
         why = f"lowers chi-square by {base.chi_square - fit.chi_square:.0f}"
         why += " with the other named effects" * (len(names) > 1)
@@ -214,14 +132,14 @@ class DiagnosisWriter:
 
     def _record_diagnosis(self, first: Composition) -> Diagnosis:
         """Diagnosis in which a recording mistake explains the gap; the model to use remains the starting model."""
-        best, claim, base = first.best, first.best.claim, self._with_free_gains(self.search.base)
+        best, claim, base = first.best, first.best.claim, self.base
         assert claim is not None
         command, corrections = f"bushfit diagnose CAMPAIGN {claim.options}", "; ".join(claim.corrections)
         advice = f"if the records of the tests confirm this mistake, correct {corrections} (or {command})"
         summary = f"these tests agree if {claim.sentence}"
         if self.finding.verdict == "ambiguous":
             summary += "; correct this first: the tests do not decide yet what else is missing"
-        after = self._with_free_gains(best.state.plain)
+        after = with_free_gains(best.state.plain, self.search.data)
         closing = Closing(base, holdout=hold_out(base, after, self.search.data.bounds))
         diagnosis = self._build(closing, summary, self._record_entries(first), places=best, next_test=advice)
         sentence = f"fitted to the tests as they are, which only agree if {claim.sentence}: {advice}"
@@ -341,7 +259,7 @@ class DiagnosisWriter:
             places: hypothesis whose faulty parts of the tests are reported; None without any.
             next_test: advice on the next test; "" for the usual confirmation of the first entry.
         """
-        search, base, after, gap = self.search, self._with_free_gains(self.search.base), closing.fit, closing.gap
+        search, base, after, gap = self.search, self.base, closing.fit, closing.gap
         bounds, regions = search.data.bounds, find_regions(base)
         faulty_parts = places.faulty_parts if places else ()
         at_fault = [part.region(base.residual, places.change) for part in faulty_parts] if places else []
