@@ -15,10 +15,8 @@ from bushfit.fitting.measured_test import shown_amplitude
 from bushfit.fitting.preparation import MeasuredSweep, split_by_kind
 from bushfit.fitting.problem import FitResult
 from bushfit.fitting.repeats import to_unit_interval
-from bushfit.geometry import Place
 from bushfit.model.model import Model
-from bushfit.reading.measurement import Stepped
-from bushfit.reading.preload import Preload, add_preload
+from bushfit.reading.preload import add_preload
 from bushfit.units import number
 
 #: Smallest smooth misfit (root mean square, in units of its noise) of a region that is listed.
@@ -50,37 +48,30 @@ class LineMisfit:
     """Mean misfit of one line of a sweep (all runs at one constant amplitude or frequency) over its repeats.
 
     Args:
-        name: name of the test.
-        direction: direction or specimen of the test.
-        preload: preload of the test; None if it is unknown.
-        stepped: quantity that varies along the line, "frequency" or "amplitude"; None if neither is constant.
-        frequency: frequency of each point [Hz], (n,).
-        amplitude: zero-to-peak amplitude of each point [m or rad], (n,).
+        sweep: the sweep.
+        rows: index of one of the sweep's points at each of the n stepped values, (n,).
         misfit: complex relative difference K_measured/K_model - 1 of each point, averaged over the repeats, (n,).
         noise: standard deviation of the relative gain and of the phase [rad] of one mean value, (2,).
     """
 
-    name: str
-    direction: Place
-    preload: Preload | None
-    stepped: Stepped | None
-    frequency: Array
-    amplitude: Array
+    sweep: MeasuredSweep
+    rows: Array
     misfit: Array
     noise: Array
 
     @property
     def step(self) -> Array:
         """Stepped quantity at each point, (n,): frequency [Hz] at a constant amplitude, else amplitude [m or rad]."""
-        return self.amplitude if self.stepped == "amplitude" else self.frequency
+        return self.sweep.step[self.rows]
 
     @property
     def label(self) -> str:
         """Text with the line's constant quantity and its preload, such as "0.1 mm"; else the name of the test."""
-        constant = f"{self.frequency[0]:.4g} Hz" if self.stepped else self.name
-        if self.stepped == "frequency":
-            constant = shown_amplitude(self.direction, float(self.amplitude[0]))
-        return add_preload(constant, self.preload, self.direction)
+        sweep, first = self.sweep, self.rows[0]
+        constant = f"{sweep.frequency[first]:.4g} Hz" if sweep.test.stepped else sweep.name
+        if sweep.test.stepped == "frequency":
+            constant = shown_amplitude(sweep.direction, float(sweep.amplitude[first]))
+        return add_preload(constant, sweep.test.preload, sweep.direction)
 
     @cached_property
     def smooth(self) -> Array:
@@ -99,14 +90,13 @@ def line_misfits(sweep: MeasuredSweep, model: Model) -> Iterator[LineMisfit]:
     ratio = sweep.measured / sweep.response(model) - 1.0
     for held_value in np.unique(sweep.held_value):
         mask = sweep.held_value == held_value
-        _, first, index = np.unique(sweep.step[mask], return_index=True, return_inverse=True)
-        counts = np.bincount(index)
+        _, first, index, counts = np.unique(
+            sweep.step[mask], return_index=True, return_inverse=True, return_counts=True
+        )
         mean = (np.bincount(index, ratio[mask].real) + 1j * np.bincount(index, ratio[mask].imag)) / counts
         variance = np.square(sweep.noise.random[sweep.name, float(held_value)]) + np.square(sweep.noise.shared)
         noise = np.sqrt(variance / np.median(counts) + np.square(sweep.noise.level))
-        frequency, amplitude = (values[mask][first] for values in (sweep.frequency, sweep.amplitude))
-        test = sweep.name, sweep.direction, sweep.test.preload, sweep.test.stepped
-        yield LineMisfit(*test, frequency, amplitude, mean, noise)
+        yield LineMisfit(sweep, np.flatnonzero(mask)[first], mean, noise)
 
 
 def find_regions(fit: FitResult) -> tuple[MisfitRegion, ...]:
@@ -120,32 +110,26 @@ def _sweep_regions(fit: FitResult) -> Iterator[MisfitRegion]:
     """Yield for each direction the regions where the storage and the loss of sweeps deviate smoothly from the model."""
     _, sweeps = split_by_kind(fit.data_sets)
     lines = [line for sweep in sweeps for line in line_misfits(sweep, fit.model)]
-    for direction, stepped in dict.fromkeys((line.direction, line.stepped) for line in lines):
-        mine = [line for line in lines if line.direction == direction and line.stepped == stepped]
+    kinds = [(line.sweep.direction, line.sweep.test.stepped) for line in lines]
+    for direction, stepped in dict.fromkeys(kinds):
+        mine = [line for line, kind in zip(lines, kinds, strict=True) if kind == (direction, stepped)]
         for part, name in enumerate(_PARTS):
             pieces = [(np.real if part == 0 else np.imag)(line.smooth) for line in mine]
             sizes = [piece / line.noise[part] for piece, line in zip(pieces, mine, strict=True)]
             excess = float(np.sqrt(np.mean(np.square(np.concatenate(sizes)))))
             strongest = max(float(np.abs(size).max()) for size in sizes)
-            touched = [i for i, size in enumerate(sizes) if np.abs(size).max() > _STRONG * strongest]
-            strong = [np.abs(sizes[i]) > _STRONG * strongest for i in touched]
-            frequencies, amplitudes = (
-                np.concatenate([getattr(mine[i], axis)[mask] for i, mask in zip(touched, strong, strict=True)])
-                for axis in ("frequency", "amplitude")
-            )
             if max(float(np.abs(piece).max()) for piece in pieces) < _LEAST:
                 continue
-            band = float(frequencies.min()), float(frequencies.max())
-            span = float(amplitudes.min()), float(amplitudes.max())
-            yield MisfitRegion(
-                direction,
-                "sweep",
-                band,
-                span,
-                name,
-                excess,
-                _describe_sweep_misfit(name, mine, pieces, touched, (band, span)),
+            strong = [line.rows[np.abs(size) > _STRONG * strongest] for line, size in zip(mine, sizes, strict=True)]
+            touched = [i for i, rows in enumerate(strong) if rows.size]
+            band, span = (
+                (min(float(values.min()) for values in points), max(float(values.max()) for values in points))
+                for points in (
+                    [getattr(mine[i].sweep, axis)[strong[i]] for i in touched] for axis in ("frequency", "amplitude")
+                )
             )
+            reading = _describe_sweep_misfit(name, mine, pieces, touched, (band, span))
+            yield MisfitRegion(direction, "sweep", band, span, name, excess, reading)
 
 
 def _describe_sweep_misfit(
@@ -167,20 +151,20 @@ def _describe_sweep_misfit(
     quantity = "stiffness" if part == "storage" else "loss"
     labels = [line.label for line in lines]
     if len({*labels}) < len(labels):  # sweeps at several temperatures
-        labels = [line.name for line in lines]
+        labels = [line.sweep.name for line in lines]
     worst = max(touched, key=lambda i: float(np.abs(pieces[i]).max()))
     largest = max(pieces[worst].tolist(), key=abs)
     sides = ("above", "below") if largest > 0 else ("below", "above")
-    line = lines[worst]
-    fixed_axis = {"frequency": "amplitude", "amplitude": "frequency", None: "run"}[line.stepped]
+    line, direction, stepped = lines[worst], lines[worst].sweep.direction, lines[worst].sweep.test.stepped
+    fixed_axis = {"frequency": "amplitude", "amplitude": "frequency", None: "run"}[stepped]
     across = [i for i, piece in enumerate(pieces) if np.max(-np.sign(largest) * piece) > _STRONG * abs(largest)]
     agreeing = [i for i in touched if i == worst or i not in across]
     is_everywhere = len(agreeing) == len(lines)
     levels = f"every {fixed_axis}" if is_everywhere else ", ".join(dict.fromkeys(labels[i] for i in agreeing))
-    unit, factor = ("Hz", 1.0) if line.stepped != "amplitude" else line.direction.display.displacement
-    low, high = (factor * end for end in spans[line.stepped == "amplitude"])
+    unit, factor = ("Hz", 1.0) if stepped != "amplitude" else direction.display.displacement
+    low, high = (factor * end for end in spans[stepped == "amplitude"])
     sentences = [
-        f"measured {line.direction} {quantity} is up to {number(100 * abs(largest), 2)} % of |K| {sides[0]} the model "
+        f"measured {direction} {quantity} is up to {number(100 * abs(largest), 2)} % of |K| {sides[0]} the model "
         f"({low:.3g} to {high:.3g} {unit}, at {levels})"
     ]
     means = [float(np.mean(piece)) for piece in pieces]
@@ -188,8 +172,8 @@ def _describe_sweep_misfit(
         sentences.append(f"It is {sides[1]} the model at {', '.join(dict.fromkeys(labels[i] for i in across))}")
     elif is_everywhere and len(means) > 1 and np.ptp(means) >= _CHANGES * max(abs(mean) for mean in means):
         sentences.append(f"The gap {_trend_verb(means[0], means[-1])} with {fixed_axis}")
-    trend = _trend(line.stepped or "frequency", line.step, pieces[worst])
-    several = len(agreeing) > 1 and line.stepped
+    trend = _trend(stepped or "frequency", line.step, pieces[worst])
+    several = len(agreeing) > 1 and stepped
     sentences.append(f"The gap is largest at {line.label}, where it {trend}" if several else f"The gap {trend}")
     return ". ".join(sentences)
 
