@@ -18,7 +18,7 @@ from test_schemas import complaints
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import RigSettings
-from bushfit.diagnosis.described import GapDescription, describe
+from bushfit.diagnosis.closing import GapDescription, describe
 from bushfit.diagnosis.fits import fit_model
 from bushfit.diagnosis.power_law import PowerLaw, nearest_power_law
 from bushfit.effects.contract import Array, Level
