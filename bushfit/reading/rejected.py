@@ -98,7 +98,7 @@ def note_left_out(table: Table, rows: Sequence[FaultyRow], count: int) -> Iterat
             line=broken[0][0],
             found=", ".join(f"lines {first} and {second}" for first, second in broken[:_MOST_LISTED]),
             expected=f"the {len(table.headers)} cells of a row on one line",
-            hint="join these lines; a table that was copied from a PDF often breaks so",
+            hint="join these lines; tables that were copied from a PDF often have such broken rows",
         )
     in_doubt = [row for row in left_out if row[2] in ("doubtful", "word")]
     is_much = len(in_doubt) > _MOST_WORDS or sum(fault == "doubtful" for *_, fault in in_doubt) > 1

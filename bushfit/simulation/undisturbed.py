@@ -173,7 +173,7 @@ def _programme(test: SimulatedLoop) -> tuple[Array, float, int]:
             "a programme of loops is too long to simulate",
             place="simulate.loops",
             found=f"{duration:.3g} s at up to {fastest:.3g} Hz, {duration / step:.2g} steps",
-            expected=f"no more than {_MOST_STEPS} steps, {_ROWS_PER_CYCLE * _STEPS_PER_ROW} a cycle of the fastest",
+            expected=f"no more than {_MOST_STEPS} steps ({_ROWS_PER_CYCLE * _STEPS_PER_ROW} per fastest cycle)",
             hint="use shorter pauses, or simulate slow and fast loops in separate programmes",
         )
     rest = np.zeros(round(test.pause / step))
