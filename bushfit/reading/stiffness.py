@@ -110,11 +110,7 @@ def with_positive_loss(
         automatic = test.force_sign is None and np.median(np.abs(phase)) > np.pi / 2.0
         if automatic:
             sentence = f'"{header}" exceeds 90 deg: the force has the opposite sign, and the phase is turned by 180 deg'
-            notes.append(
-                Caveat(
-                    "force_turned", f"{sentence}; to keep the sign as recorded, state force_sign = 1 in the campaign"
-                )
-            )
+            notes.append(Caveat("force_turned", f"{sentence}; to keep the sign, state force_sign = 1"))
         corrected["phase"] = np.angle(-np.exp(1j * phase)) if automatic or test.force_sign == -1 else phase
     size = np.median(values.get("storage_stiffness", values.get("stiffness", np.ones(1))))
     sizes = {"loss_stiffness": size, "loss_compliance": np.median(values.get("storage_compliance", np.ones(1)))}
@@ -126,9 +122,7 @@ def with_positive_loss(
         automatic = test.phase_sign is None and np.mean(share < -LEAST_LOSS_FACTOR) > _THROUGHOUT
         if automatic:
             sentence = f'"{columns[role].header}" is negative throughout and is read with the opposite sign'
-            notes.append(
-                Caveat("loss_turned", f"{sentence}; to keep the sign as recorded, state phase_sign = 1 in the campaign")
-            )
+            notes.append(Caveat("loss_turned", f"{sentence}; to keep the sign, state phase_sign = 1"))
         corrected[role] = -corrected[role] if automatic or test.phase_sign == -1 else corrected[role]
     return corrected, tuple(notes)
 
