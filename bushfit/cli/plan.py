@@ -167,18 +167,12 @@ def _print_plan(output: Output, plan: Plan) -> None:
 
 def _print_tests(output: Output, plan: Plan) -> None:
     """Print a table of the planned tests with the number of runs of each."""
-    import numpy as np
-
-    from bushfit.campaign.simulated import SimulatedLoop
-    from bushfit.planning.contract import operating_points
-
     tests, rows = plan.tests, []
-    for test, runs in Counter(tests).items():
-        unit, factor = test.direction.display.displacement
-        rates, sizes = (np.unique(axis).tolist() for axis in operating_points(test))
-        kind = f"loop, {test.cycles} cycles" if isinstance(test, SimulatedLoop) else f"sweep over {test.stepped}"
-        motion = f"{_listed(sizes, factor)} {unit}", _listed(rates, 1.0)
-        rows.append((str(test.direction), kind, *motion, str(runs)))
+    for test, count in Counter(tests).items():
+        run, (unit, factor) = plan.document["tests"][tests.index(test)], test.direction.display.displacement
+        kind = f"sweep over {run['stepped']}" if run["kind"] == "sweep" else f"loop, {run['cycles']} cycles"
+        motion = f"{_listed(run['amplitudes'], factor)} {unit}", _listed(run["frequencies_Hz"], 1.0)
+        rows.append((run["place"], kind, *motion, str(count)))
     columns = ("direction", "test", "amplitude", "frequency [Hz]", "runs")
     output.print_table(f"{len(tests)} runs", columns, rows, text_columns=4)
 

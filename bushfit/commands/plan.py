@@ -10,7 +10,6 @@ import pandas as pd
 
 from bushfit.campaign.campaign import Campaign, model_of
 from bushfit.campaign.schema import RigSettings
-from bushfit.campaign.simulated import SimulatedLoop
 from bushfit.commands.fit import prepare_tests
 from bushfit.commands.predict import GridOptions, requested_settings
 from bushfit.effects.contract import Array
@@ -138,24 +137,25 @@ def plan_sheet(plan: Plan) -> pd.DataFrame:
         Table of texts, with durations [min].
     """
     counts, repeats, rows = Counter(plan.tests), Counter[Test](), []
-    durations = np.array([run["minutes"] for run in plan.document["tests"]])
-    for order, test in enumerate(plan.tests, start=1):
+    minutes = 0.0
+    for order, (test, run) in enumerate(zip(plan.tests, plan.document["tests"], strict=True), start=1):
         repeats[test] += 1
+        minutes += run["minutes"]
         (frequency, amplitude), (length, force, _) = operating_points(test), test.direction.display
         stiffness = np.abs(plan.knowledge.model.stiffness(test.direction, frequency, amplitude))
         largest = number(force.factor * float(np.max(stiffness * amplitude)), 2)
         rows.append(
             {
                 "order": order,
-                "direction": str(test.direction),
-                "test": "loop" if isinstance(test, SimulatedLoop) else f"sweep over {test.stepped}",
+                "direction": run["place"],
+                "test": f"sweep over {run['stepped']}" if run["kind"] == "sweep" else "loop",
                 "amplitude": f"{_distinct(length.factor * amplitude)} {length.name}",
                 "frequency [Hz]": _distinct(frequency),
-                "cycles": str(test.cycles) if isinstance(test, SimulatedLoop) else "until steady",
+                "cycles": "until steady" if run["cycles"] is None else str(run["cycles"]),
                 "repeat": f"{repeats[test]} of {counts[test]}",
                 "force up to": f"{largest} {force.name}",
-                "minutes": round(float(durations[order - 1]), 1),
-                "minutes so far": round(float(np.sum(durations[:order])), 1),
+                "minutes": round(run["minutes"], 1),
+                "minutes so far": round(minutes, 1),
                 "what for": plan.purposes[test],
             }
         )

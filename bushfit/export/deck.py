@@ -90,21 +90,6 @@ def stiffness_tables(prediction: Prediction) -> list[StiffnessTable]:
     return tables
 
 
-def amplitude_levels(request: ExportRequest) -> list[AmplitudeLevel]:
-    """Group the stiffness tables of all directions by the rank of their amplitude, for one solver property per rank.
-
-    Returns:
-        Levels, each with a stiffness table per direction: the smallest amplitudes first. A direction with fewer
-        amplitudes than others repeats its largest.
-    """
-    by_direction = [stiffness_tables(prediction) for prediction in exported_directions(request)]
-    count = max(map(len, by_direction))
-    frequency = by_direction[0][0].frequency
-    constant = StiffnessTable(Direction.TORSION, 0.0, frequency, np.full(frequency.size, request.cardanic or 0.0))
-    stated = () if request.cardanic is None else (constant,)
-    return [(*(tables[min(rank, len(tables) - 1)] for tables in by_direction), *stated) for rank in range(count)]
-
-
 def by_dof(level: AmplitudeLevel) -> Iterator[tuple[int, StiffnessTable]]:
     """Yield each degree of freedom (1 to 3 translations, 4 to 6 rotations) with its table, for one amplitude level."""
     pairs = [(dof, table) for table in level for dof in (DOFS[table.direction] if table.amplitude else CARDANIC)]
@@ -191,6 +176,9 @@ def deck_lines(
 ) -> list[str]:
     """Write the lines of a deck: its heading, then a comment and the lines of each amplitude level.
 
+    A level has the stiffness tables of one amplitude of each direction, the smallest amplitudes first. A direction with
+    fewer amplitudes than others repeats its largest.
+
     Args:
         request: model and settings.
         mark: comment sign at the start of a comment line.
@@ -202,7 +190,13 @@ def deck_lines(
     """
     about = f"{units}; frequency in {units.frequency.name}, rotation in rad"
     lines = comment_lines(mark, [*heading(request, about, omissions), usage])
-    for rank, level in enumerate(amplitude_levels(request), start=1):
+    by_direction = [stiffness_tables(prediction) for prediction in exported_directions(request)]
+    stated: AmplitudeLevel = ()
+    if request.cardanic is not None:
+        frequency = by_direction[0][0].frequency
+        stated = (StiffnessTable(Direction.TORSION, 0.0, frequency, np.full(frequency.size, request.cardanic)),)
+    for rank in range(1, max(map(len, by_direction)) + 1):
+        level = *(tables[min(rank, len(tables)) - 1] for tables in by_direction), *stated
         lines += [*comment_lines(mark, [f"{name}{rank}: {describe_amplitudes(level)}"]), *level_lines(rank, level)]
     return lines
 
