@@ -96,10 +96,8 @@ def _print_comparison(output: Output, name: str, compared: ComparisonOutput) -> 
         action = f"next: bushfit fit {quote_path(Path(content.compared[0].source))}{effects}"
         sentences = [*advice, *notes, *(compared.words if output.verbose else ())]
     else:
-        different = []
-        for label, comparison in zip(labels, compared.comparisons, strict=True):
-            if names := comparison.differing:
-                different.append(f"{label} differs from {first} in {', '.join(names)}")
+        differing = zip(labels, (comparison.differing for comparison in compared.comparisons), strict=True)
+        different = [f"{label} differs from {first} in {', '.join(names)}" for label, names in differing if names]
         verdict = f"{'; '.join(different)}: more than chance explains"
         action = "do not exchange the results; differences.csv lists stiffness and loss factor at each point"
         if not different:

@@ -159,14 +159,15 @@ class Output:
         distinct = dict[str, Caveat]()
         for warning in warnings:
             distinct.setdefault(warning.kind, warning)
-        printed = warnings if self.verbose else [*distinct.values()][:_MOST_WARNINGS]
+        printed, messages = warnings if self.verbose else [*distinct.values()][:_MOST_WARNINGS], self.messages
         for warning in printed:
-            self.messages.print(f"[yellow]warning:[/yellow] {escape(warning.text)}")
+            messages.print(f"[yellow]warning:[/yellow] {escape(warning.text)}")
             if warning.consequence != GENERAL:
-                self.messages.print(f"  {warning.consequence}", markup=False)
+                messages.print(f"  {warning.consequence}", markup=False)
         if remaining := len(warnings) - len(printed):
-            more = f"{remaining} more warning{'s' * (remaining > 1)}"
-            self.messages.print(f"{more}: -v prints all; the result files contain them", markup=False)
+            messages.print(
+                f"{remaining} more warning{'s' * (remaining > 1)}: -v prints all; the result files contain them"
+            )
         self._warnings.clear()
 
     def print_table(

@@ -101,11 +101,8 @@ def command(files: tuple[Path, ...], levels: str | None, cycles: int, output: Ou
         points = points.assign(direction=name)  # so that init knows it whatever the file is called
     file = output.formats.table("sweep")
     snippet = f'[[sweeps]]\nfile = "{file}"\n{body} = {json.dumps(name, ensure_ascii=False)}\n'
-    document = {body: name, "points": points.to_dict(orient="list"), **document}
-    document |= {
-        **to_entries(warnings),
-        "campaign": snippet,
-    }
+    document = {body: name, "points": points.to_dict(orient="list"), **document, **to_entries(warnings)}
+    document["campaign"] = snippet
     results = [ResultFile("sweep", "table", points), ResultFile("reduce", "figure", figure)]
     output.write(folder, results, document, files)
     following = f"bushfit init {quote_path(folder / file)} --amplitude zero-to-peak"

@@ -74,8 +74,7 @@ def print_run(output: Output, name: str, outcome: RunOutput, action: str) -> Non
     print_result(output, f"{name}: {'model with the added effects' if outcome.added else 'joint fit'}", result)
     if diagnosed and (output.verbose or diagnosed.diagnosis.verdict != "consistent"):
         print_findings(output, diagnosed)
-    if result.measured:
-        _print_range(output, outcome)
+    _print_range(output, outcome)
     print_validations(output, outcome.validations, diagnosed.validations_before if diagnosed else ())
     print_origin(output, result)
     print_predictions(output, outcome.predicted)
@@ -93,8 +92,8 @@ def print_run(output: Output, name: str, outcome: RunOutput, action: str) -> Non
 
 def _print_range(output: Output, outcome: RunOutput) -> None:
     """Print the tested range of frequency and amplitude for each direction, fitted or not."""
-    measured = outcome.result.measured
-    fitted = measured.directions if measured else ()
+    if not (measured := outcome.result.measured):
+        return
     output.console.print("tested range; outside this range the model extrapolates", style="bold")
     for direction in dict.fromkeys(data_set.direction for data_set in outcome.data.data_sets):
         unit, factor = direction.display.displacement
@@ -102,7 +101,7 @@ def _print_range(output: Output, outcome: RunOutput) -> None:
         frequencies = [end for test in tests for end in (test.frequency.min(), test.frequency.max())]
         amplitudes = [factor * end for test in tests for end in (test.amplitude.min(), test.amplitude.max())]
         frequency = format_range("Hz", min(frequencies), max(frequencies))
-        use = "" if str(direction) in fitted else ", not fitted"
+        use = "" if str(direction) in measured.directions else ", not fitted"
         output.print(f"  {direction}: {frequency}, {format_range(unit, min(amplitudes), max(amplitudes))}{use}")
 
 

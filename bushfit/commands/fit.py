@@ -166,12 +166,11 @@ def campaign_files(
     files = list[ResultFile]()
     if "loop" in kinds and marked.loops:
         loops = ResultFile("loops", "table", partial(tables.loops_table, model, marked.loops))
-        files.append(loops)
-        files.append(ResultFile("loops", "figure", lambda: plots.fits.loops_figure(result, loops.content(), title)))
+        files += [loops, ResultFile("loops", "figure", lambda: plots.fits.loops_figure(result, loops.content(), title))]
     if "sweep" in kinds and marked.sweeps:
         sweeps = ResultFile("sweeps", "table", partial(tables.sweeps_table, model, marked.sweeps))
-        files.append(sweeps)
-        files.append(ResultFile("sweeps", "figure", lambda: plots.fits.sweeps_figure(result, sweeps.content(), title)))
+        figure = ResultFile("sweeps", "figure", lambda: plots.fits.sweeps_figure(result, sweeps.content(), title))
+        files += [sweeps, figure]
         if "temperature" in model.effects and any(map(can_shift, data.campaign.sweeps)):
             shifted = cache(partial(master_curve, result, marked.sweeps))
             files += [

@@ -141,8 +141,8 @@ def prediction_files(output: PredictionOutput, *, wide: bool) -> list[ResultFile
 
     files = list[ResultFile]()
     for name, predictions in zip(names, by_place, strict=True):
-        files.append(ResultFile(name, "table", partial(joined_table, prediction_table, predictions)))
-        files.append(ResultFile(name, "figure", partial(draw, predictions[0])))
+        table = partial(joined_table, prediction_table, predictions)
+        files += [ResultFile(name, "table", table), ResultFile(name, "figure", partial(draw, predictions[0]))]
         if len(predictions) > 1:
             over_preload = partial(plots.preload.preload_figure, result, predictions, result.name)
             files.append(ResultFile(f"{name}_preload", "figure", over_preload))

@@ -45,9 +45,8 @@ def parameters(model: Result | HasResult) -> pd.DataFrame:
     """
     from bushfit.report.spreadsheets import parameters_table
 
-    ends = {"95 %, low": "low", "95 %, high": "high"}
     rows = parameters_table(as_result(model)).set_index("parameter").rename_axis(None)
-    rows = rows.rename(columns=ends)
+    rows = rows.rename(columns={"95 %, low": "low", "95 %, high": "high"})
     rows["fitted"] = rows["fitted"] == "yes"
     columns = ["value", "std error", "low", "high"]
     return rows[[*columns, "unit", "fitted"]].astype(dict.fromkeys(columns, float))

@@ -24,13 +24,12 @@ from bushfit.export.deck import (
     StiffnessForm,
     by_dof,
     comment_lines,
-    deck_lines,
     describe_amplitudes,
-    encode_deck,
     exported_directions,
     format_real,
     stiffness_tables,
     table_omissions,
+    write_deck,
 )
 from bushfit.export.prony import COMPOUND, LONG_TERM, PronySeries, prony_omissions, prony_series, shear_strain
 from bushfit.units import number
@@ -59,10 +58,9 @@ def export(request: ExportRequest) -> Exported:
         sentence = "compound: no elastic branch, so no long-term modulus, and no material"
     usage = "behaviors are for CONN3D2 of type BUSHING; they act in *STEADY STATE DYNAMICS, DIRECT"
     omissions += (Caveat("format_omission", sentence), *(prony_omissions(series) if series else ()))
-    lines = deck_lines(request, "**", units, omissions, usage, "BUSHING_", partial(_behavior, units))
-    return Exported(
-        {"bushing.inp": encode_deck([*lines, *(_materials(request, units, series) if has_material else ())])}, omissions
-    )
+    materials = _materials(request, units, series) if has_material else ()
+    deck = write_deck(request, "**", units, omissions, usage, "BUSHING_", partial(_behavior, units), materials)
+    return Exported({"bushing.inp": deck}, omissions)
 
 
 def _behavior(units: UnitSystem, rank: int, level: AmplitudeLevel) -> Iterator[str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Literal
@@ -159,11 +159,8 @@ class ExportRequest:
                 strained = tuple(strain / model.unit_strain(place) for strain in measured.strain)
                 frequencies = np.array([test.frequency_Hz for test in tests] or measured.frequency)
                 amplitudes = factor * np.array([test.amplitude for test in tests] or strained)
-                parts = [
-                    str(place),
-                    format_range("Hz", frequencies.min(), frequencies.max()),
-                    format_range(unit, amplitudes.min(), amplitudes.max()),
-                ]
+                parts = [str(place), format_range("Hz", frequencies.min(), frequencies.max())]
+                parts.append(format_range(unit, amplitudes.min(), amplitudes.max()))
                 temperatures = [kelvin - CELSIUS for kelvin in measured.temperature or ()]
                 parts.append(format_range("degC", *temperatures) if temperatures else "temperature not stated")
                 parts.append("fitted" if fitted else "not fitted")
@@ -195,5 +192,5 @@ class Exported:
     """
 
     files: Mapping[str, bytes]
-    omissions: tuple[Caveat, ...] = ()
+    omissions: Sequence[Caveat] = ()
     arms: tuple[Arms, ...] = ()

@@ -165,7 +165,7 @@ def heading(request: ExportRequest, units: str, omissions: Iterable[Caveat]) -> 
     ]
 
 
-def deck_lines(
+def write_deck(
     request: ExportRequest,
     mark: str,
     units: UnitSystem,
@@ -173,8 +173,9 @@ def deck_lines(
     usage: str,
     name: str,
     level_lines: Callable[[int, AmplitudeLevel], Iterable[str]],
-) -> list[str]:
-    """Write the lines of a deck: its heading, then a comment and the lines of each amplitude level.
+    last_lines: Iterable[str] = (),
+) -> bytes:
+    """Write a deck: its heading, then a comment and the lines of each amplitude level.
 
     A level has the stiffness tables of one amplitude of each direction, the smallest amplitudes first. A direction with
     fewer amplitudes than others repeats its largest.
@@ -187,6 +188,10 @@ def deck_lines(
         usage: comment on the use of the deck in the solver.
         name: prefix of the names of the levels, before their rank.
         level_lines: function of the rank of a level, from 1, and the level that returns its lines.
+        last_lines: lines below those of all levels.
+
+    Returns:
+        Content of the deck, in ASCII.
     """
     about = f"{units}; frequency in {units.frequency.name}, rotation in rad"
     lines = comment_lines(mark, [*heading(request, about, omissions), usage])
@@ -198,7 +203,7 @@ def deck_lines(
     for rank in range(1, max(map(len, by_direction)) + 1):
         level = *(tables[min(rank, len(tables)) - 1] for tables in by_direction), *stated
         lines += [*comment_lines(mark, [f"{name}{rank}: {describe_amplitudes(level)}"]), *level_lines(rank, level)]
-    return lines
+    return "".join(f"{line}\n" for line in (*lines, *last_lines)).encode("ascii")
 
 
 def describe_amplitudes(level: Iterable[StiffnessTable]) -> str:
@@ -211,11 +216,6 @@ def describe_amplitudes(level: Iterable[StiffnessTable]) -> str:
 def format_real(value: float, digits: int = 5) -> str:
     """Format a number in exponential notation with `digits` significant digits; zero becomes "0."."""
     return f"{value:.{digits - 1}E}" if value else "0."
-
-
-def encode_deck(lines: Iterable[str]) -> bytes:
-    """Join the lines of a deck, each with a line feed, and encode them; all characters must be ASCII."""
-    return ("\n".join(lines) + "\n").encode("ascii")
 
 
 def table_omissions(request: ExportRequest, form: StiffnessForm) -> Iterator[Caveat]:

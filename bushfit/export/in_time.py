@@ -1,7 +1,7 @@
 """A model in the time domain: lists of values, directions and Maxwell arms, as the C sources of an FMU read them."""
 
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -68,11 +68,11 @@ class TimeModel:
 
     places: tuple[Place, ...]
     values: tuple[FmuValue, ...]
-    fields: tuple[Mapping[str, str], ...]
-    levers: tuple[float, ...]
+    fields: Sequence[Mapping[str, str]]
+    levers: Sequence[float]
     arms: tuple[Arms, ...]
-    arm_rows: tuple[tuple[int, float, float], ...]
-    omissions: tuple[Caveat, ...]
+    arm_rows: Sequence[tuple[int, float, float]]
+    omissions: Sequence[Caveat]
 
 
 def time_model(request: ExportRequest) -> TimeModel:
@@ -109,22 +109,15 @@ def time_model(request: ExportRequest) -> TimeModel:
     for prediction in request.predictions:
         omissions += [*_steady_omissions(model, omitted, prediction, conditions), *band_omissions(prediction)]
     sizes = values_under(model, conditions)
+    arm_rows = [
+        (index, float(modulus / sizes[part.size]), float(time))
+        for index, part in enumerate(arms)
+        for modulus, time in zip(part.modulus, part.time, strict=True)
+    ]
+    fields = [_fields(model, place, of_place, arms) for place, of_place in zip(request.places, names, strict=True)]
     tubes = [(bushing_at(model.bushing, place), place) for place in request.places]
-    return TimeModel(
-        request.places,
-        values,
-        tuple(
-            _fields(model, place, place_names, arms) for place, place_names in zip(request.places, names, strict=True)
-        ),
-        tuple(tube.outer_radius if tube and place.is_rotation else 1.0 for tube, place in tubes),
-        arms,
-        tuple(
-            (index, float(modulus / sizes[part.size]), float(time))
-            for index, part in enumerate(arms)
-            for modulus, time in zip(part.modulus, part.time, strict=True)
-        ),
-        tuple(omissions),
-    )
+    levers = [tube.outer_radius if tube and place.is_rotation else 1.0 for tube, place in tubes]
+    return TimeModel(request.places, values, fields, levers, arms, arm_rows, omissions)
 
 
 def fields_of(effect: Effect) -> list[str]:

@@ -17,10 +17,9 @@ from bushfit.export.deck import (
     AmplitudeLevel,
     StiffnessForm,
     by_dof,
-    deck_lines,
-    encode_deck,
     format_real,
     table_omissions,
+    write_deck,
 )
 
 #: Difference between the table numbers of two properties. The last two digits are the degree of freedom n for K, and
@@ -58,8 +57,8 @@ def export(request: ExportRequest) -> Exported:
         "the tables act in frequency response; PBUSH alone, at the lowest frequency, acts elsewhere; PARAM,G is added "
         "to the loss"
     )
-    lines = deck_lines(request, "$", units, omissions, usage, "property ", partial(_property, names, form, units))
-    return Exported({file: encode_deck(lines)}, omissions)
+    deck = write_deck(request, "$", units, omissions, usage, "property ", partial(_property, names, form, units))
+    return Exported({file: deck}, omissions)
 
 
 def _property(

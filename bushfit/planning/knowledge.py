@@ -212,13 +212,9 @@ def estimate_noise(data: PreparedCampaign) -> Noise:
         gain, phase = np.sqrt(np.mean(np.square(list(noise.random.values())), axis=0)).tolist()
         estimate = replace(estimate, scatter=(gain, phase), shared=noise.shared)
     if loops:
-        rows = [loop.test.time.size / loop.cycles for loop in loops]
-        forces = [
-            loop.relative_noise * np.sqrt(ROWS_PER_CYCLE / count) for loop, count in zip(loops, rows, strict=True)
-        ]
+        squares = [loop.relative_noise**2 * ROWS_PER_CYCLE * loop.cycles / loop.test.time.size for loop in loops]
         as_one = float(np.mean([loop.row_noise.rows_as_one for loop in loops]))
-        force = float(np.sqrt(np.mean(np.square(forces))))
-        estimate = replace(estimate, force=force, rows_as_one=as_one)
+        estimate = replace(estimate, force=float(np.sqrt(np.mean(squares))), rows_as_one=as_one)
     return estimate
 
 

@@ -4,8 +4,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from bushfit.caveat import Caveat, to_caveats
-
 #: Value of the key `schema`, which names the layout of the file.
 BATCH_SCHEMA: Literal["bushfit/batch/2"] = "bushfit/batch/2"
 #: Result of the comparison of a part with its limits.
@@ -72,11 +70,6 @@ class PartTable:
     labels: Mapping[str, str]
     values: Sequence[float | None]
     curve: Sequence[float] | None
-
-    @property
-    def caveats(self) -> list[Caveat]:
-        """Warnings with their kinds."""
-        return to_caveats(self.warnings, self.warning_kinds)
 
 
 @dataclass(frozen=True, kw_only=True)

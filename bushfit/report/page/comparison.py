@@ -51,6 +51,7 @@ def comparison_page(comparison: ComparisonFile, chart: ResultFile | None = None)
         for file, sha256 in dict.fromkeys([(entry.source, entry.sha256), *inputs]):
             if sha256:
                 labels.setdefault((file, sha256), []).append(entry.label)
+    moduli = all(results[0].stiffness.startswith("modulus") for results in differences.values())
     pictures = []
     if len(names) * len(differences) <= _MOST_DRAWN:
         figure = chart.content() if chart else plots.comparison.comparison_figure(comparison)
@@ -58,9 +59,7 @@ def comparison_page(comparison: ComparisonFile, chart: ResultFile | None = None)
     context = {
         "document": comparison,
         "names": names,
-        "resisted": "modulus"
-        if all(results[0].stiffness.startswith("modulus") for results in differences.values())
-        else "stiffness",
+        "resisted": "modulus" if moduli else "stiffness",
         "entries": [{"of": entry, "conditions": stated} for entry, stated in zip(compared, conditions, strict=True)],
         "differ": [name for name in _CONDITIONS if len({stated[name] for stated in conditions}) > 1],
         "sizes": [difference_sizes(one) for of_place in differences.values() for one in of_place],

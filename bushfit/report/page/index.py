@@ -7,6 +7,7 @@ from urllib.parse import quote
 
 import numpy as np
 
+from bushfit.caveat import to_caveats
 from bushfit.report import plots
 from bushfit.report.batch_document import BatchFile, PartTable
 from bushfit.report.page import render_page
@@ -61,14 +62,15 @@ def index_page(batch: BatchFile, folder: Path, base: str = "") -> str:
     first, ordinary = ordered[: min(important, row_limit)], ordered[important:]
     chosen = first + [ordinary[index] for index in spread_indices(len(ordinary), max(0, row_limit - len(first)))]
     rows, warnings = list[tuple[Any, ...]](), dict[str, list[tuple[str, str]]]()
-    for part in (parts[index] for index in chosen):
-        for warning in part.caveats:
-            warnings.setdefault(warning.kind, []).append((part.name, warning.text))
+    caveats = {index: to_caveats(parts[index].warnings, parts[index].warning_kinds) for index in chosen}
+    for index in chosen:
+        for warning in caveats[index]:
+            warnings.setdefault(warning.kind, []).append((parts[index].name, warning.text))
     numbers = {kind: number for number, kind in enumerate(warnings, start=1)}
     for index in chosen:
         is_known = has_curves and np.isfinite(relative[index]).all()
         mean = 100.0 * np.expm1(np.log1p(relative[index]).mean()) if is_known else None
-        notes = sorted({numbers[warning.kind] for warning in parts[index].caveats})
+        notes = sorted({numbers[warning.kind] for warning in caveats[index]})
         curve, drawn = (lines[index].tolist() if is_known else [] for lines in (relative, heights))
         rows.append((parts[index], links[index], curve, drawn, mean, notes))
     pictures = []
