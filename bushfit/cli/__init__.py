@@ -1,6 +1,7 @@
 """Command line: one file for each command, which parses the options, calls one function and prints the result."""
 
 import contextlib
+import errno
 import importlib
 import io
 import os
@@ -98,7 +99,8 @@ def main(command: click.Command = cli) -> None:
     with contextlib.redirect_stderr(heard), contextlib.redirect_stdout(read):
         try:
             status = command.main(sys.argv[1:] or ["--help"], prog_name=command.name, standalone_mode=False)
-            sys.stdout.flush()
+            if read.fault != os.strerror(errno.EPIPE):  # a reader such as `head` need not read to the end
+                read.flush()
         except (Exception, KeyboardInterrupt) as error:
             sys.stderr.write(f"bushfit: {_message(error)}\n")
             status = 2
@@ -140,11 +142,14 @@ class _Stream:
 
     If writing fails, a stream that `is_needed` (for results) raises an OutputError; a stream for messages drops the
     text.
+
+    Attributes:
+        fault: reason why writing failed; None if it did not fail.
     """
 
     def __init__(self, stream: TextIO | None, *, is_needed: bool) -> None:
         self._stream, self._is_needed = stream, is_needed
-        self._fault = None if stream else "it is closed"
+        self.fault = None if stream else "it is closed"
 
     def write(self, text: str) -> int:
         """Write a text to standard output or error; return the number of characters written."""
@@ -161,14 +166,14 @@ class _Stream:
 
     def _attempt(self, work: Callable[[TextIO], int | None]) -> int:
         """Call a function that writes to the stream; return its result, or 0 if the stream cannot be written."""
-        if self._stream and not self._fault:
+        if self._stream and not self.fault:
             try:
                 return work(self._stream) or 0
             except OSError as error:
-                self._fault = error.strerror or str(error)
+                self.fault = error.strerror or str(error)
                 nowhere = os.open(os.devnull, os.O_WRONLY)
                 os.dup2(nowhere, self._stream.fileno())  # or Python tries again in the end
                 os.close(nowhere)
         if self._is_needed:
-            raise OutputError(f"standard output cannot be written: {self._fault}")
+            raise OutputError(f"standard output cannot be written: {self.fault}")
         return 0

@@ -192,6 +192,8 @@ def test_a_pipe_that_nobody_reads(folder):
     done = subprocess.run([*BUSHFIT, *PREDICT], stdout=write, stderr=subprocess.PIPE, check=False)
     assert_one_line(done.returncode, done.stderr)
     assert (folder / "x" / "axial.csv").exists()
+    done = subprocess.run([*BUSHFIT, *PREDICT[:-2], "--force"], stdout=write, stderr=subprocess.PIPE, check=False)
+    assert (done.returncode, b"error" in done.stderr) == (0, False), "a text need not be read to the end"
     done = subprocess.run([*BUSHFIT, *PREDICT[:-2], "--force"], stdout=subprocess.PIPE, stderr=write, check=False)
     assert done.returncode == 0
     assert (folder / "x" / "axial.csv").exists()
