@@ -222,15 +222,12 @@ def _print_steps(output: Output, reduction: Reduction, points: pd.DataFrame) -> 
     level, stiffness, _ = response_headers(reduction.direction)
     rows = []
     for _, line in points.groupby([level, "repeat"]):
-        spans = (
-            _format_hertz(line["frequency [Hz]"]),
-            _format_span(line[stiffness], 4),
-            _format_span(line["loss factor [-]"], 3),
-        )
+        frequencies, loss_factors = _format_hertz(line["frequency [Hz]"]), _format_span(line["loss factor [-]"], 3)
         noise = (line[stiffness.replace(" [", " std error [")] / line[stiffness]).max()
         errors = number(100 * noise, 1), number(100 * line["force distortion [-]"].max(), 2)
         step = number(line[level].iloc[0], 4), f"{line['repeat'].iloc[0]}"
-        rows.append((*step, f"{len(line)}", *spans, *errors))
+        magnitudes = _format_span(line[stiffness], 4)
+        rows.append((*step, f"{len(line)}", frequencies, magnitudes, loss_factors, *errors))
     title = f"{len(points)} point{'s' * (len(points) > 1)} found; noise and THD: the largest of each line"
     heads = ("repeat", "points", "f [Hz]", stiffness.replace("stiffness", "|K|"), "loss factor", "noise [%]", "THD [%]")
     output.print_table(title, (level.replace("amplitude", "level"), *heads), rows)

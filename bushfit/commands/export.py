@@ -83,24 +83,18 @@ def export(
         predicted = predict(result, campaign, temperature=temperature, **grid)
     today = datetime.now(UTC).date().isoformat()
     request = ExportRequest(result, source, tuple(predicted.predictions), day=today, **settings)
-    exported: dict[str, Exported] = {}
+    exported, formats = list[Exported](), dict[str, FormatEntry]()
     for name in track("formats written", names):
         module, _, function = FORMATS[name].partition(":")
-        exported[name] = getattr(importlib.import_module(f"bushfit.{module}"), function)(request)
-    document: ExportDocument = {
-        "formats": {
-            name: {
-                "files": list(written.files),
-                "left_out": [omission.text for omission in written.omissions],
-                "left_out_kinds": [omission.kind for omission in written.omissions],
-            }
-            for name, written in exported.items()
-        },
-        **to_entries(predicted.warnings),
-    }
-    contents = {name: content for written in exported.values() for name, content in written.files.items()}
+        written: Exported = getattr(importlib.import_module(f"bushfit.{module}"), function)(request)
+        exported.append(written)
+        limits = to_entries(written.omissions)
+        left_out, kinds = limits["warnings"], limits["warning_kinds"]
+        formats[name] = {"files": [*written.files], "left_out": left_out, "left_out_kinds": kinds}
+    document: ExportDocument = {"formats": formats, **to_entries(predicted.warnings)}
+    contents = {name: content for written in exported for name, content in written.files.items()}
     files = [ResultFile(name, "raw", content) for name, content in contents.items()]
-    if arms := tuple(part for written in exported.values() for part in written.arms):
+    if arms := tuple(part for written in exported for part in written.arms):
         places = [prediction.direction for prediction in predicted.predictions]
         files.append(ResultFile("arms", "table", partial(arms_table, result.model, arms, places)))
     return document, files
