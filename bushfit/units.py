@@ -53,6 +53,8 @@ _MULTIPLE = re.compile(
     r"(?![\d.])\s*[*·]?(?P<unit>.*)"
 )
 _SUPERSCRIPTS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
+#: Full-width signs of Chinese and Japanese texts as plain ones.
+FULL_WIDTH = {code: code - 0xFEE0 for code in range(0xFF01, 0xFF5F)}
 #: Maximum length of a unit [characters]; pint is slow with longer texts.
 _LONGEST_UNIT = 40
 #: Unit by spelling: in lower case, with capitals, and spellings of an acceleration and of a length.
@@ -301,7 +303,7 @@ def common_unit(unit: str) -> tuple[str, str]:
 @lru_cache(maxsize=256)
 def _resolve(text: str) -> tuple[float, str]:
     """Factor to SI, and SI base unit, of a unit; the base unit of an angle is the radian."""
-    text = text.strip().rstrip(".")
+    text = text.translate(FULL_WIDTH).strip().rstrip(".")
     text = re.sub("(?<=10)[⁻⁰¹²³⁴-⁹]+", lambda power: "^" + power[0].translate(_SUPERSCRIPTS), text)
     if match := _MULTIPLE.fullmatch(text):
         scale, base = _resolve(match["unit"])

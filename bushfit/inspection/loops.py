@@ -30,6 +30,8 @@ _SMALLEST_OFFSET = 0.02
 _MOST_SOFTENING = 10.0
 #: [ln] Difference of frequency above which cycles belong to no step.
 _SAME_FREQUENCY = 0.1
+#: Minimum ratio of the largest step to the range of its record; chosen: steps beside a larger motion are not the test.
+_SMALLEST_LEVEL = 0.5
 #: Maximum number of cycles that are compared at each end of a loop; chosen: enough to show settling.
 _MOST_END_CYCLES = 6
 #: Harmonic of the motion above which a spectral line is a ripple, unless a triangle; chosen: waveforms have fewer.
@@ -60,7 +62,8 @@ def describe_loop(loop: Loop, labels: Labels) -> Findings:
     force, to_force = display_unit(*units.force, half_force)
     half_motion = float(np.ptp(loop.displacement)) / 2.0
     frequency, amplitude = float(prepared.frequency[0]), float(prepared.amplitude[0])
-    mean_motion, mean_force = prepared.coefficients[0].real, float(prepared.measured_force.mean())
+    whole = slice(int(prepared.measured_force.size * int(prepared.cycles + 0.01) / prepared.cycles))
+    mean_motion, mean_force = prepared.coefficients[0].real, float(prepared.measured_force[whole].mean())
     noise = f"{number(100 * prepared.noise / half_force, 2)} % of half the {names[1]} range, per row"
     if prepared.noise > half_force:
         noise = "not known: the record is not a steady loop"
@@ -127,7 +130,8 @@ def describe_history(history: Loop, labels: Labels, needed: Sequence[float] = ()
     steps, (unit, factor) = reduction.steps, history.direction.display.displacement
     levels = sorted({step.level for step in steps})
     frequencies = sorted({step.nominal_frequency for step in steps})
-    if any(min(abs(np.log(one / frequency)) for one in frequencies) > _SAME_FREQUENCY for frequency in needed):
+    is_small = levels[-1] < _SMALLEST_LEVEL * np.ptp(history.displacement) / 2.0
+    if is_small or any(np.abs(np.log(np.array(frequencies) / one)).min() > _SAME_FREQUENCY for one in needed):
         raise MeasurementError("not all cycles are steps", found=f"{needed}", expected="three cycles or more of each")
     rows = min(step.rows_per_cycle for step in steps)
     facts = {

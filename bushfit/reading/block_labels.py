@@ -49,7 +49,7 @@ def label_columns(
         if role not in roles and distinguishes and None not in values:
             columns[header] = [value for value in values if value is not None]
     titles = [lines[-1].text.rpartition(": ")[2] if lines else "" for lines in above]
-    are_titles = are_sides or all(title and not _VALUE.search(title) for title in titles)
+    are_titles = are_sides or ("displacement" not in roles and not any(map(_VALUE.search, titles)))
     names = {title.rstrip(" #.0123456789") for title in titles}
     are_runs = all(map(_RUNS.heading, names))
     if not columns and len(set(titles)) > 1 and are_titles and (are_sides or len(names) > 1 or are_runs):

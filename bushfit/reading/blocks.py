@@ -15,7 +15,7 @@ from bushfit.reading.layout import Layout
 from bushfit.reading.lines import WITH_UNIT, Line, is_comment, is_row, is_summary_row, is_units_row
 from bushfit.reading.names import NO_LABELS, labels_above
 from bushfit.reading.numerals import is_like_number, plainest_value
-from bushfit.reading.roles import PAIRS
+from bushfit.reading.roles import PAIRS, is_test
 from bushfit.reading.source import Channels, RowSource, Sheet, Text, cells_of
 
 #: Largest text that is searched for blocks without their own headers [bytes]; chosen: some 100,000 rows.
@@ -30,8 +30,8 @@ _COMPLEX = re.compile(
 )
 #: Name of a block in a header: a word, or a word and a number: "K axial [N/mm]", "K*_S1", "tan d Part 1", "K* #2".
 _NAME_OF_SIDE = re.compile(r"(?<![^\s_])([^\W\d_][^\W_]*(?:[\s_]\d+)?|#\d+)(?![^\s_])")
-#: Words for a set point or deviation, which name no block.
-_STATISTICS = frozenset(map(plain, WORDS["qualifiers"]["not_measured"]))
+#: Words for a set point, a deviation or a corrected value, which name no block.
+_STATISTICS = frozenset(map(plain, WORDS["qualifiers"]["not_measured"] + WORDS["qualifiers"]["processed"]))
 #: Level of an amplitude in the name of a quantity: "K* 0.1 mm [N/mm]".
 _LEVEL = re.compile(r"(?<![\w.,])\d+(?:[.,]\d+)?\s?(?:[^\W\d]{1,3}|%)(?![^\W_])")
 #: First rows that are searched for complex numbers and units; chosen: room for remarks.
@@ -169,7 +169,7 @@ def exchange_rows(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> 
             table.append([" ".join(f"[{word}]" if units.is_unit(word) else word for word in words), *numbers])
         plain_names = [_LEVEL.sub("", cells[0]) for cells in table]
         roles = vocabulary.roles(plain_names)
-        is_table = "frequency" in roles and len(roles) > 2
+        is_table = ("frequency" in roles and len(roles) > 2) or is_test(roles)
         is_exchanged |= is_table
         content += [line.content for line in above]
         content += zip_longest(*table, fillvalue="") if is_table else [line.content for line in rows]

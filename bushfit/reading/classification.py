@@ -77,13 +77,15 @@ def classify(
             continue
         if heading is None or (plain_name(header) == "k" and heading.role in roles):
             continue
-        if heading.role == "time" and table.labels_above.sampling and all(row[index] == "" for row in table.first_rows):
+        if heading.role == "time" and all(row[index] == "" for row in table.first_rows) and table.labels_above.sampling:
             continue  # the X_Value of LabVIEW, whose step is stated above
         role, column = heading.role, column_of(table, heading, index, stated_units.get(heading.role))
         if heading.extreme:
             extremes.setdefault((role, heading.extreme), column)
         elif role not in roles:
             roles[role] = column
+        elif role == "preload" and _is_force(column) != _is_force(roles[role]):
+            roles[role] = column if _is_force(column) else roles[role]  # the mean displacement states the same
         elif role in ROLE_SETS["replaceable"]:
             rejected.add(role)
             del roles[role]
@@ -119,6 +121,11 @@ def classify(
     notes = [*table.layout.notes, *notes]
     clocks = frozenset({time.index} if time and is_clock else ())
     return replace(table, roles=roles, notes=tuple(notes), clocks=clocks)
+
+
+def _is_force(column: Column) -> bool:
+    """True for a column in a unit of force or moment."""
+    return any(units.is_compatible(column.unit or "", si) for si in ("N", "N*m"))
 
 
 def _columns_beside_mean(table: Table, roles: Mapping[str, Column]) -> list[Caveat]:

@@ -136,6 +136,7 @@ _DANGLING = re.compile(r"\s*[,;]\s*(?=[\])]|$)|(?<=[\[(])\s*[,;]\s*")
 _SPELLINGS: dict[int, int | str] = {
     **str.maketrans("\uff08\uff09\uff3b\uff3d\u2032\u2019\u00b4", "()[]'''"),
     **{0x2033: "''", ord('"'): ""},
+    **units.FULL_WIDTH,
 }
 #: End of a name before a unit without brackets: "force_N", "Kraft in N", "F / kN", "load, N".
 _NAME_END = re.compile(r"\s+in\s+|\s*/\s*|\s*,\s*|\s+|_")
@@ -390,7 +391,8 @@ def _splits(text: str) -> Iterator[tuple[str, str | None, bool]]:
             text = "N" if text == "n" and end.start() > 1 else text  # "force_n" in names without capitals
             if _PER.search(name[: end.start()]):
                 continue  # a part of a unit such as N_per_mm
-            if not (text.startswith("dyn") or units.is_number(text)):  # dynamic, and no dyne; the first of several
+            is_count = units.is_number(text) and (text != "1" or "/" not in end[0])  # the first of several
+            if not (text.startswith("dyn") or is_count):  # dynamic, and no dyne
                 yield name[: end.start()], text, False
 
 

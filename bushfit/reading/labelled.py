@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bushfit.caveat import Caveat
-from bushfit.reading.headers import SWEEP_COLUMNS, WORDS, Vocabulary
+from bushfit.reading.headers import SWEEP_COLUMNS, WORDS, Vocabulary, plain
 from bushfit.reading.measurement import Floats
 from bushfit.reading.names import named_direction
 from bushfit.reading.runs import group_rows
@@ -20,12 +20,16 @@ if TYPE_CHECKING:
 
 #: Smallest mean number of rows per distinct text in a column that assigns rows to tests; chosen: a row counter has one.
 _FEWEST_ROWS = 3
+#: Names of runs of loops; in a sweep they may be anything.
+_RUNS_OF_LOOPS = frozenset(map(plain, ("block", *WORDS["rows"]["run"])))
+#: Names of columns that mark rows as valid or not.
+_FLAGS = frozenset(map(plain, WORDS["rows"]["flag"]))
 #: Known names of columns that assign rows to tests: of directions, specimen numbers, part numbers and runs.
 _LABELS = Vocabulary(
     {
-        **WORDS["rows"],
+        "direction": WORDS["rows"]["direction"],
         **{key: WORDS["above"][key] for key in ("specimen_number", "part_number")},
-        "run": [*SWEEP_COLUMNS["repeat"], "block"],
+        "run": [*SWEEP_COLUMNS["repeat"], "block", *WORDS["rows"]["run"]],
     }
 )
 
@@ -126,7 +130,8 @@ def find_labels(table: Table) -> Mapping[str, tuple[int, Sequence[str]]]:
     for index, header in enumerate(table.headers):
         heading = _LABELS.heading(header) if header else None
         role = heading.role if heading else ""
-        if role in ("", *labels) or (header == "block" and "displacement" not in table.roles):
+        is_of_loop = role == "run" and plain(header) in _RUNS_OF_LOOPS
+        if role in ("", *labels) or (is_of_loop and "displacement" not in table.roles):
             continue
         if _may_distinguish_tests(table, index):
             (texts,) = column_texts(table, index)
@@ -208,7 +213,7 @@ def note_not_understood(
         for index, header in enumerate(table.headers)
         if index not in understood
         and header != "block"
-        and (settled or not table.holds_numbers(index))
+        and (settled or plain(header) in _FLAGS or not table.holds_numbers(index))
         and _may_distinguish_tests(table, index)
     ]
     for index, texts in zip(unclear, column_texts(table, *unclear), strict=True):
@@ -217,12 +222,13 @@ def note_not_understood(
         present, number, counts = np.unique(codes, return_inverse=True, return_counts=True)
         depends_on = [settled] if is_number else [(quantity,) for quantity in settled]
         explained = any(all(np.ptp(number[group]) == 0 for group in group_rows(*keys)) for keys in depends_on)
-        if counts.size > 1 and not explained and not (is_number and counts.min() < _FEWEST_ROWS):
+        is_plain = explained or (is_number and counts.min() < _FEWEST_ROWS)
+        if counts.size > 1 and (plain(header) in _FLAGS or not is_plain):
             values = sorted(texts.distinct[code] for code in present)
             listed = ", ".join(values[:4]) + ", ..." * (len(values) > 4)
             yield Caveat(
                 "column_not_understood",
                 f'"{header}" (column {index + 1}) varies from row to row ({listed}) and is not understood: all rows '
                 "are one test, with equal points as repeats. To select rows, write "
-                f'rows = {{ "{header}" = "{values[0]}" }} in the campaign',
+                f'rows = {{ "{header}" = "{"..." if plain(header) in _FLAGS else values[0]}" }} in the campaign',
             )

@@ -19,7 +19,7 @@ from pydantic import BeforeValidator
 from bushfit.caveat import Caveat
 from bushfit.reading.headers import WORDS, Vocabulary, plain, split_unit
 from bushfit.reading.lines import MOST_COLUMNS, Content, Line, is_comment, is_row, is_units_row, split
-from bushfit.reading.numerals import is_like_number
+from bushfit.reading.numerals import is_like_number, plainest_value
 from bushfit.reading.roles import is_test, is_unit_alone, stated_once
 
 #: Characters that separate columns, by their names in a campaign, in the order in which they are tried.
@@ -40,6 +40,8 @@ _LINES_BELOW_HEADER = 8
 #: Names in the first cells of rows that describe the columns, such as "Unit" and "dx"; and of rows of units among them.
 _UNIT_ROWS = frozenset(map(plain, WORDS["rows_of"]["units"]))
 _DESCRIPTIONS = _UNIT_ROWS | frozenset(map(plain, WORDS["rows_of"]["descriptions"]))
+#: Letter, which each name of a column has.
+_LETTER = re.compile(r"[^\W\d_]")
 #: A number with a number sign: "#1".
 _NUMBERED = re.compile(r"#\s?\d+\b")
 #: Blanks between a name and the bracket of its unit, which do not separate columns.
@@ -263,11 +265,9 @@ def _likeliest(
     for delimiter, row in rows:
         cells = {index: split(lines[index].content, delimiter) for index in reversed(before)}
         of_units = {index for index in cells if is_units_row(cells[index])}
-        fitting = [
-            n for n in cells if 0 <= len(cells[n]) - len(row) < 2 and n not in of_units
-        ]  # a comment may be empty
-        if fitting:
-            of_units -= {index for index in of_units if _is_labelled_units_row(cells[index], len(cells[index]))}
+        # one more, because a comment may be empty
+        fitting = [n for n in cells if 0 <= len(cells[n]) - len(row) < 2 and n not in of_units]
+        if fitting := [n for n in fitting if all(map(_LETTER.search, filter(None, cells[n])))] or fitting:
             index = next((index for index in fitting if index + 1 in of_units), fitting[0])
             return index, delimiter, cells[index]
     return end, *max(rows, key=lambda entry: len(entry[1]))
@@ -294,7 +294,8 @@ def _layout(
     above = ((line.number, split(line.content, delimiter)) for line in reversed(lines[:index]))
     described = [*takewhile(lambda one: one[1][0] and not is_like_number(one[1][0]), below)]
     if not any(plain(cells[0]) in _DESCRIPTIONS for _, cells in described):
-        described = []
+        counted = [f"{number:g}" for number in map(plainest_value, below[0][1])] if below and len(headers) > 2 else []
+        described = below[:1] if counted == [str(n) for n in range(1, len(headers) + 1)] else []
     of_units = [(line, cells) for line, cells in (*described, *above) if _is_labelled_units_row(cells, len(headers))]
     if of_units:
         units_line, row = of_units[0][0], ["", *of_units[0][1][1:], *row][: len(headers)]

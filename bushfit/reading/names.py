@@ -87,6 +87,8 @@ _BEFORE_VALUE = re.compile(r"\s+(?=\d[\d.,]*(?:\s*[^\W\d]\S*)?$)")
 _NAMED_QUANTITY = re.compile(
     r"(?P<name>[^\t;,:=]*?)\s*[=:]\s*(?P<number>[+-]?\d+(?:[.,]\d+)?)\s*(?P<unit>[^\s\d,;]+(?:\s*/\s*[^\s\d,;]+)?)"
 )
+#: Separator of several statements in a line: "Temp: 23 C, Preload: 500 N".
+_PARTS_OF_LINE = re.compile(r"[,;|]\s+|\s/\s|\t")
 #: Decimal comma of a number at the start of a value.
 _COMMA = re.compile(r"^([+-]?\d+),(?=\d+(?!\d|[.,]\d))")
 #: Unit of a sampling rate in samples: "kS/s", "samples/s", "SPS".
@@ -226,7 +228,8 @@ def labels_above(lines: Iterable[Line]) -> Labels:
     convention = conventions.pop() if len(conventions) == 1 else None
     rows = map(_name_and_values, lines)
     x_unit = next((row[1] for row in rows if len(row) > 1 and plain(row[0]) in _X_UNITS and units.is_unit(row[1])), "s")
-    labels = reduce(or_, (_label_in_line(line, x_unit) for line in lines), Labels(convention=convention))
+    parts = [Line(line.number, part) for line in lines for part in (line.content, *_PARTS_OF_LINE.split(line.text))]
+    labels = reduce(or_, (_label_in_line(line, x_unit) for line in parts), Labels(convention=convention))
     return labels | Labels(specimen_number=labels.part_number)
 
 
@@ -261,7 +264,7 @@ def _name_and_values(line: Line) -> list[str]:
     cells = [cell.strip(' "') for cell in cells if cell.strip(' "')]
     if len(cells) == 1 and (end := _BEFORE_VALUE.search(split_convention(cells[0])[0])):
         convention = split_convention(cells[0])[1]
-        cells = [end.string[: end.start()], f"{end.string[end.end() :]} {COUNTED[convention]}"]
+        cells = [end.string[: end.start()], end.string[end.end() :] + COUNTED[convention]]
     return cells
 
 

@@ -121,9 +121,7 @@ def si_column(table: Table, role: str, tested: Place, hint: str | None = None) -
     next_step = None
     if not units.is_unit(unit):
         size = unit if units.is_unit(_MULTIPLE.sub("", unit).strip()) else f"... {example}"
-        next_step = f'state the unit: units = {{ {role} = "{example}" }} in the campaign'
-        if not unit.isalpha():
-            next_step = f'state the size of one "{unit}": units = {{ {role} = "{size}" }} in the campaign'
+        next_step = f'state the size of one "{unit}": units = {{ {role} = "{size}" }} in the campaign'
     with error_location(table.file, place, next_step):
         if expected == "Hz" and is_angular(column.header, unit):
             per_second = "rad/s" if units.is_compatible(unit, "rad/s") else "Hz"

@@ -26,6 +26,8 @@ THREE_CYCLES = 2.95
 SAME_MOTION = 0.05
 #: Largest relative difference of two equal half cycles or periods; chosen: rigs are more even.
 _SAME_RATE = 0.08
+#: [ln] Largest change of the period within one part; chosen: far more than any rig wanders.
+_WIDEST_RATE = 0.2
 #: Largest relative difference of the ranges of two parts with one amplitude; chosen: rigs step by more.
 _SAME_AMPLITUDE = 0.08
 #: Distance from an end of the record, relative to a cycle, up to which a part is extended to that end.
@@ -129,13 +131,16 @@ def steady_spans(loop: Loop, time: Floats, motion: Floats) -> list[SteadySpan]:
     if not spans and len(parts) > 1:  # rests that belong to a wave, or one cycle between them
         spans = _single_cycles(parts, noise) or _spans_of_part(time, motion, turns, noise)
     inner = np.abs(np.diff(motion[turns]))[1:-1]
-    if not spans and inner.size >= 4 and np.ptp(np.log(inner)) > 0.3:  # no rig misses its amplitude by a third
+    periods = time[turns[3:-1]] - time[turns[1:-3]]
+    changes = [float(np.ptp(np.log(values))) for values in (inner, periods) if values.size]
+    if not spans and inner.size >= 4 and max(changes) > 0.3:  # no rig misses its amplitude or rate by a third
         unit, factor = loop.direction.display.displacement
         low, high = factor * inner.min() / 2.0, factor * inner.max() / 2.0
         raise NoTestError(
             "no part of the record is a loop",
             file=loop.source.file if loop.source else loop.name,
-            found=f"{inner.size / 2.0:.2g} cycles from {low:.3g} to {high:.3g} {unit}, no two successive ones equal",
+            found=f"{inner.size / 2.0:.2g} cycles from {low:.3g} to {high:.3g} {unit} and from {periods.min():.3g} to "
+            f"{periods.max():.3g} {'s' if loop.has_recorded_time else 'rows'}, no two successive ones equal",
             expected="at least two cycles of one amplitude and rate",
             hint="record five cycles of each amplitude; for a road load, use bushfit respond or [[validation]]",
         )
@@ -182,6 +187,8 @@ def _spans_of_part(time: Floats, motion: Floats, turns: Integers, noise: float) 
     for strokes in _alike_runs(size, same_size):
         halves = np.diff(across[strokes])
         for run in _alike_runs(halves, _SAME_RATE * halves):
+            if np.ptp(np.log(halves[run][1:] + halves[run][:-1])) > _WIDEST_RATE:
+                continue  # a swept sine
             first, last = strokes.start + run.start, strokes.start + run.stop
             begin, end = float(across[first]), float(across[last])
             period, stroke = 2.0 * (end - begin) / (last - first), float(np.median(size[first : last + 1]))

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from bushfit.effects.contract import Array
+from bushfit.errors import NoTestError
 from bushfit.fitting.prepare_loop import prepare_loop
 from bushfit.geometry import Direction
 from bushfit.model.model import Model
@@ -103,6 +104,23 @@ def test_each_steady_part_is_a_loop_in_its_order(paper_model, case):
     for loop in loops:
         rows = slice(loop.part.first_row, loop.part.first_row + loop.force.size)
         np.testing.assert_array_equal(loop.force, record.force[rows])
+
+
+@pytest.mark.parametrize("rest", [1.0, 3.0, 10.0])
+def test_cycles_that_rest_at_the_top_keep_their_size(paper_model, rest):
+    """In the digits of a coarse converter, in which rows at rest are equal."""
+    motion = np.concatenate([np.append(cycles(1, 1, start=0.25) - 1e-3, hold(rest))] * 3)
+    record = rig.simulate_motion(paper_model, Direction.AXIAL, motion, STEP, 0.1)
+    coarse = replace(record, displacement=np.round(motion, 6), force=np.round(record.force))
+    (loop,) = split_record(coarse)
+    assert 1e3 * float(prepare_loop(loop).amplitude[0]) == pytest.approx(1.0, rel=0.01)
+
+
+def test_a_swept_sine_is_no_loop(paper_model):
+    time = np.arange(0.0, 80.0, STEP)
+    record = recorded(paper_model, 1e-3 * np.sin(2.0 * np.pi * (0.1 * time + 0.005 * time**2)))
+    with pytest.raises(NoTestError, match="no part of the record is a loop"):
+        split_record(record)
 
 
 @pytest.mark.parametrize("case", ["pauses", "one speed"])

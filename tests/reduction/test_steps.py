@@ -206,6 +206,12 @@ def test_what_is_no_steady_sine_makes_no_points(motion, said):
     assert said in str(error.value)
 
 
+def test_equal_steps_with_a_rest_of_two_cycles_are_repeats():
+    motion = np.sin(10.0 * np.pi * TIME) * ((TIME < 3.0) | (TIME >= 3.4))
+    steps = reduce([Loop("x", Direction.AXIAL, TIME, 1e-3 * motion, motion)]).steps
+    assert [step.repeat for step in steps] == [1, 2]
+
+
 @given(
     frequency=st.floats(1.0, 150.0),
     amplitude=st.floats(1e-6, 1e-2),
