@@ -31,7 +31,7 @@ _COMPLEX = re.compile(
 #: Name of a block in a header: a word, or a word and a number: "K axial [N/mm]", "K*_S1", "tan d Part 1", "K* #2".
 _NAME_OF_SIDE = re.compile(r"(?<![^\s_])([^\W\d_][^\W_]*(?:[\s_]\d+)?|#\d+)(?![^\s_])")
 #: Words for a set point, a deviation or a corrected value, which name no block.
-_STATISTICS = frozenset(map(plain, WORDS["qualifiers"]["not_measured"] + WORDS["qualifiers"]["processed"]))
+_STATISTICS = frozenset(map(plain, (*WORDS["qualifiers"]["not_measured"], *WORDS["qualifiers"]["processed"])))
 #: Level of an amplitude in the name of a quantity: "K* 0.1 mm [N/mm]".
 _LEVEL = re.compile(r"(?<![\w.,])\d+(?:[.,]\d+)?\s?(?:[^\W\d]{1,3}|%)(?![^\W_])")
 #: First rows that are searched for complex numbers and units; chosen: room for remarks.
