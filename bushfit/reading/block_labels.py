@@ -1,17 +1,32 @@
-"""Columns for the quantities that titles and lines above the blocks of a table state.
+"""Lines above a table and its blocks: remarks, and columns for the quantities that titles and lines state.
 
 A stated value holds for the rows of its block. A condition, a direction and a part hold until others are stated.
 """
 
+from __future__ import annotations
+
 import re
+from collections import Counter
 from collections.abc import Sequence
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 from bushfit import units
+from bushfit.caveat import Caveat
 from bushfit.reading.headers import COUNTED, SWEEP_COLUMNS, Vocabulary
-from bushfit.reading.lines import Line
-from bushfit.reading.names import labels_and_text_above, labels_in_names, named_direction, named_quantities
+from bushfit.reading.lines import Line, is_summary_row
+from bushfit.reading.names import is_remark, labels_and_text_above, labels_in_names, named_direction, named_quantities
+from bushfit.reading.numerals import is_like_number
 from bushfit.reading.roles import CONDITIONS
+from bushfit.reading.source import cells_of
+
+if TYPE_CHECKING:
+    from bushfit.reading.table import Table
+
+#: Mark of a footnote in a header, such as "Amplitude¹ [mm]".
+_FOOTNOTE_MARK = re.compile("[\u00b9\u00b2\u00b3\u2074\u2020\u2021]")
+#: Largest number of characters of a remark that is quoted.
+_LONGEST_QUOTE = 100
 
 #: Names of the runs of a test, in the titles of blocks.
 _RUNS = Vocabulary({"repeat": SWEEP_COLUMNS["repeat"]})
@@ -19,6 +34,38 @@ _RUNS = Vocabulary({"repeat": SWEEP_COLUMNS["repeat"]})
 _VALUE = re.compile(r"[:=;,\t]|^[\W\d]*$")
 #: Roles whose values hold until others are stated, with the value for blocks before the first one.
 _HOLDING = {**dict.fromkeys(CONDITIONS, ""), "direction": "not stated", "part": "not stated"}
+
+
+def find_lines_above(table: Table) -> list[Line]:
+    """Find the non-empty lines above a table, and the notes below it; a footnote is behind the header it refers to."""
+    layout, last = table.layout, table.layout.lines_before_data
+    not_above = (layout.header_line, layout.units_line)
+    lines = [line for line in table.source.head() if line.number <= last and line.number not in not_above]
+    marks = {mark: header for header in table.headers for mark in _FOOTNOTE_MARK.findall(header)}
+    for line in table.source.tail():
+        cells = list(map(str, cells_of(line, layout.delimiter)))
+        is_note = not (any(map(is_like_number, cells)) or is_summary_row(cells) or layout.is_repeated(cells))
+        if line.number > last and is_note:
+            mark = line.text[:1]
+            lines.append(Line(line.number, f"{marks[mark]}: {line.text[1:]}") if mark in marks else line)
+    return lines
+
+
+def find_remarks(table: Table) -> tuple[Caveat, ...]:
+    """Warn of lines above a table, marked rows and hidden rows that may change what the test means."""
+    remarks = ((line.number, line.text[:_LONGEST_QUOTE]) for line in table.lines_above if is_remark(line.text))
+    warnings = [Caveat("remark", f'line {number} is not understood: "{text}"') for number, text in remarks]
+    rows = [] if all(is_like_number(str(cell)) for cell in table.first_row) else table.first_rows
+    texts = Counter(cell for row in rows for cell in row if isinstance(cell, str) and cell[:1].isalpha())
+    warnings += [
+        Caveat("marked_rows", f'{count} rows are marked "{cell[:_LONGEST_QUOTE]}"')
+        for cell, count in texts.items()
+        if is_remark(cell)
+    ]
+    if hidden := [number for number in table.source.hidden if number > table.layout.header_line]:
+        sentence = f"{len(hidden)} rows from row {hidden[0]} on are hidden in the workbook, but are read"
+        warnings.append(Caveat("hidden_rows", sentence))
+    return tuple(warnings)
 
 
 def label_columns(
@@ -51,7 +98,7 @@ def label_columns(
     titles = [lines[-1].text.rpartition(": ")[2] if lines else "" for lines in above]
     are_titles = are_sides or ("displacement" not in roles and not any(map(_VALUE.search, titles)))
     names = {title.rstrip(" #.0123456789") for title in titles}
-    are_runs = all(map(_RUNS.heading, names))
+    are_runs = names == {""} or all(map(_RUNS.heading, names))
     if not columns and len(set(titles)) > 1 and are_titles and (are_sides or len(names) > 1 or are_runs):
         columns["repeat" if are_runs else "part"] = list(titles)
     return columns | {"block": [str(number) for number in range(1, len(stated) + 1)]}

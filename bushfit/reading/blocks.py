@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from dataclasses import replace
-from itertools import groupby, islice, pairwise, zip_longest
+from itertools import groupby, islice, zip_longest
 from typing import NamedTuple
 
 from bushfit import units
@@ -28,8 +28,8 @@ _NUMERIC = b"0123456789.,+-eEdD \t\r\n"
 _COMPLEX = re.compile(
     r"\(?\s*([+-]?[\d.,]+(?:[eEdD][+-]?\d+)?)\s*([+-]\s*[\d.,]+(?:[eEdD][+-]?\d+)?)\s*\*?\s*[ij]\s*\)?"
 )
-#: Name of a block in a header: a word, or a word and a number: "K axial [N/mm]", "K*_S1", "tan d Part 1", "K* #2".
-_NAME_OF_SIDE = re.compile(r"(?<![^\s_])([^\W\d_][^\W_]*(?:[\s_]\d+)?|#\d+)(?![^\s_])")
+#: Name of a block in a header, with the number behind it: "K axial [N/mm]", "K*_S1", "tan d Part 1", "K* #2", "K 2".
+_NAME_OF_SIDE = re.compile(r"(?<![^\s_])(?=((?:[^\W\d_][^\W_]*[\s_])?#?\d|[^\W\d_][^\W_]*)(?![^\s_]))")
 #: Words for a set point, a deviation or a corrected value, which name no block.
 _STATISTICS = frozenset(map(plain, (*WORDS["qualifiers"]["not_measured"], *WORDS["qualifiers"]["processed"])))
 #: Level of an amplitude in the name of a quantity: "K* 0.1 mm [N/mm]".
@@ -106,7 +106,7 @@ def combined(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> tuple
     """
     if isinstance(source, Channels) or len(layout.headers) < 2 or layout.headerless:
         return source, layout
-    sides = _find_sides(layout) or _sides_by_word(layout, vocabulary)
+    sides = _find_sides(layout, vocabulary)
     if sides and (blocks := _side_by_side(source, layout, sides)):
         first = [*sides[0].shared, *sides[0].columns]
         headers = (*(layout.headers[index] for index in sides[0].shared), *sides[0].headers)
@@ -185,37 +185,39 @@ def _is_one_block(source: Text, layout: Layout) -> bool:
     return not source.data[end:].translate(None, _NUMERIC + layout.delimiter.encode())
 
 
-def _find_sides(layout: Layout) -> list[Side]:
-    """Columns of each of several blocks with equal headers and units; the blocks may share columns on their left."""
-    columns = list(zip(layout.headers, layout.units, strict=True))
-    first = next((column for column in columns if column[0] and columns.count(column) > 1), None)
-    starts = [index for index, column in enumerate(columns) if column == first]
-    sides = [[one for one in columns[start:end] if one[0]] for start, end in pairwise([*starts, len(columns)])]
-    is_block = len(sides) > 1 and 1 < len(sides[0]) == len(dict(sides[0])) and all(side == sides[0] for side in sides)
-    ranges = [range(start, start + len(sides[0])) for start in starts] if is_block else []
-    return [Side(range(starts[0]), columns, [layout.headers[n] for n in columns]) for columns in ranges]
+def _find_sides(layout: Layout, vocabulary: Vocabulary) -> list[Side]:
+    """Find the columns of several blocks side by side, which may share other columns.
 
-
-def _sides_by_word(layout: Layout, vocabulary: Vocabulary) -> list[Side]:
-    """Columns of each of several blocks of a sweep whose headers differ in a name: a direction, a part, "before".
-
-    The name is a word with a letter, or such a word and a number, as in "K axial [N/mm]" and "K* Part 1 [N/mm]".
+    The headers of the blocks are equal, or those of a sweep differ in a name: a direction, a part, the number of a
+    repeat, "before". Shared columns that contain the mean of the blocks are left out.
     """
+    written = list(zip(layout.headers, layout.units, strict=True))
     columns = dict[str, dict[int, str]]()
-    for index, header in enumerate(layout.headers):
+    for index, (header, unit) in enumerate(written):
+        if header and written.count((header, unit)) > 1:
+            columns.setdefault(str(written[:index].count((header, unit))), {})[index] = header
         for match in _NAME_OF_SIDE.finditer(header):
-            rest = f"{header[: match.start()].rstrip(' _')} {header[match.end() :].lstrip(' _')}".strip()
+            rest = f"{header[: match.start(1)].rstrip(' _')} {header[match.end(1) :].lstrip(' _')}".strip()
             if plain(match[1]) not in _STATISTICS and without_mean(match[1]):
                 columns.setdefault(match[1], {})[index] = rest
     for names in map(list, {tuple(by_index.values()): by_index.values() for by_index in columns.values()}.values()):
         sides = {name: by_index for name, by_index in columns.items() if list(by_index.values()) == names}
-        used = set().union(*sides.values())
-        shared = [index for index in range(len(layout.headers)) if index not in used]
-        is_sweep = "frequency" in vocabulary.roles([layout.headers[index] for index in shared])
-        roles = vocabulary.roles(names)
-        has_stiffness = any({*pair} <= roles for pair in PAIRS if pair[0] != "force_amplitude")
-        if is_sweep and has_stiffness and len(sides) > 1 and len(set(names)) == len(names) == len(roles):
-            return [Side(shared, [*by_index], names, name) for name, by_index in sides.items()]
+        used, roles = set().union(*sides.values()), vocabulary.roles(names)
+        plain_names = {plain(split_unit(name)[0]) for name in names}
+        free = [index for index in range(len(written)) if index not in used]
+        shared = [index for index in free if without_mean(split_unit(written[index][0])[0]) not in plain_names]
+        are_repeats = next(iter(sides)).isdigit() and len(shared) < len(free)  # numbers beside their mean
+        shared_roles = vocabulary.roles([layout.headers[index] for index in shared])
+        pairs = [
+            {*pair} <= roles | (shared_roles if are_repeats else set())
+            for pair in PAIRS
+            if pair[0] != "force_amplitude"
+        ]
+        is_sweep = "frequency" in shared_roles and any(pairs) and len(roles) == len(names)
+        are_equal = names == [layout.headers[index] for index in next(iter(sides.values()))]
+        is_named = are_repeats or (len(names) > 1 and not next(iter(sides)).isdigit())
+        if len(sides) > 1 and len({*names}) == len(names) and (len(names) > 1 if are_equal else is_sweep and is_named):
+            return [Side(shared, [*by_index], names, name * (not are_equal)) for name, by_index in sides.items()]
     return []
 
 

@@ -21,7 +21,6 @@ from bushfit.reading.headers import (
     plain,
     plain_name,
     split_unit,
-    without_mean,
 )
 from bushfit.reading.inference import (
     AGREEMENT,
@@ -113,7 +112,6 @@ def classify(
         notes += add_motion_as_amplitude(table, roles, stated_units)
     if "damping_coefficient" in roles and "stiffness" in roles and "stiffness" not in columns:
         notes += name_parallel_spring(roles)
-    notes += _columns_beside_mean(table, roles)
     stated = {*columns, *stated_units}
     _require_plain_names(table, {role: column for role, column in roles.items() if role not in stated})
     time = roles.get("time")
@@ -126,24 +124,6 @@ def classify(
 def _is_force(column: Column) -> bool:
     """True for a column in a unit of force or moment."""
     return any(units.is_compatible(column.unit or "", si) for si in ("N", "N*m"))
-
-
-def _columns_beside_mean(table: Table, roles: Mapping[str, Column]) -> list[Caveat]:
-    """Warnings on numbered columns, such as those of repeats, that are not read beside their mean."""
-    used = {index for column in roles.values() for index in column.indices}
-    stems = {without_mean(split_unit(column.header)[0]): column.header for column in roles.values()}
-    matches = ((header, _NUMBERED.fullmatch(split_unit(header)[0].strip())) for header in table.headers)
-    free = [
-        (header, stems[stem])
-        for index, (header, match) in enumerate(matches)
-        if match and index not in used and (stem := plain(match[1])) in stems
-    ]
-    means = dict.fromkeys(mean for _, mean in free)
-    lists = {mean: ", ".join(header for header, one in free if one == mean) for mean in means}
-    return [
-        Caveat("columns_beside_mean", f'{listed} are left out beside their mean "{mean}"')
-        for mean, listed in lists.items()
-    ]
 
 
 def _require_plain_names(table: Table, roles: Mapping[str, Column]) -> None:

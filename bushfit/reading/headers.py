@@ -99,7 +99,7 @@ _MEANS = re.compile(
 _FOOTNOTES = str.maketrans("", "", "\u00b9\u00b2\u00b3\u2070\u2074\u2075\u2076\u2077\u2078\u2079\u2020\u2021")
 #: Units with which the symbol f cannot mean a role, by name and role.
 _UNITS_NOT_F = {("f", "force"): ("Hz",), ("famplitude", "force_amplitude"): ("Hz",), ("f", "frequency"): ("N", "N m")}
-#: Units that a role cannot have, by role: "Amplitude [N/m]" is the magnitude of a stiffness.
+#: Units that a role cannot have: "Amplitude [N/m]" is the magnitude of a stiffness.
 _UNITS_NOT = {"amplitude": ("N/m", "N*m/rad")}
 #: Units with which a short or ambiguous name means a role, by name and role.
 _UNITS_OF = {
@@ -109,8 +109,6 @@ _UNITS_OF = {
 }
 #: Names of an amplitude that imply peak-to-peak.
 PEAK_TO_PEAK_NAMES = frozenset(WORDS["counting"]["peak_to_peak"])
-#: Name of an amplitude that may be peak-to-peak: a stroke, unless it is called its amplitude.
-STROKE = re.compile("|".join(WORDS["counting"]["stroke"]), re.IGNORECASE)
 #: Parts of the patterns of conventions: ends of words, and the end of a symbol ("Fmax") or unit ("mmpp") before them.
 _PARTS = {part: "|".join(WORDS["conventions"][part]) for part in ("start", "symbol", "end", "unit", "peak")}
 #: Key in words.toml of the words for each convention, in the order in which they are tried.
@@ -243,8 +241,7 @@ class Vocabulary:
             name, unit, convention = split_unit(text)
             counting = "peak-to-peak" if plain(name) in PEAK_TO_PEAK_NAMES else convention
             return Heading(self._stated[plain(header)], None if unit == name else unit, counting, logarithm)
-        # try the header without, then with the words of its convention
-        without, convention = split_convention(text)
+        without, convention = split_convention(text)  # tried before the whole header
         without, extreme = (without, None) if convention else split_extreme(text)
         forms = dict.fromkeys((without, text))
         for is_first, (name, unit, certain) in ((form is without, one) for form in forms for one in _splits(form)):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -13,7 +14,7 @@ from bushfit import units as si
 from bushfit.caveat import Caveat
 from bushfit.geometry import Place, strain_factor_of_files
 from bushfit.reading.finding import find_table
-from bushfit.reading.headers import STROKE, SWEEP_COLUMNS, ZERO_TO_PEAK, AmplitudeConvention, Column
+from bushfit.reading.headers import SWEEP_COLUMNS, WORDS, ZERO_TO_PEAK, AmplitudeConvention, Column
 from bushfit.reading.labelled import Rows, column_texts, note_not_understood
 from bushfit.reading.levels import mean_temperature, rows_of_test
 from bushfit.reading.measurement import Floats, Sweep
@@ -33,6 +34,8 @@ _FEWEST_SWEEP_ROWS = 3
 _MOST_REPEATS = 1_000_000
 #: Relative difference up to which a stated amplitude or frequency agrees with its column; chosen: rigs miss by less.
 _STATED_AGREEMENT = 0.1
+#: Name of an amplitude that may be peak-to-peak: a stroke, unless it is called its amplitude.
+_STROKE = re.compile("|".join(WORDS["counting"]["stroke"]), re.IGNORECASE)
 _HINTS = {
     "amplitude": 'or state at_amplitude = "0.1 mm" if all rows have it',
     "frequency": 'or state at_frequency = "10 Hz" if all rows have it',
@@ -175,7 +178,7 @@ def sweep_columns(
             expected="one convention",
             hint="correct one of them; what the header states needs no key in the campaign",
         )
-    if not (in_header or convention) and "amplitude" in columns and STROKE.match(columns["amplitude"].header):
+    if not (in_header or convention) and "amplitude" in columns and _STROKE.match(columns["amplitude"].header):
         raise table.header_error(
             "this amplitude may be a stroke, which is peak-to-peak",
             column=columns["amplitude"],

@@ -1,8 +1,6 @@
 """Table of a test: rows as in the file, roles of the columns, numbers in SI, and errors that state a location."""
 
 import csv
-import re
-from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -17,13 +15,14 @@ from bushfit import units
 from bushfit.caveat import Caveat
 from bushfit.errors import MeasurementError
 from bushfit.geometry import TRANSLATION, Motion
+from bushfit.reading.block_labels import find_lines_above, find_remarks
 from bushfit.reading.headers import Column, Vocabulary
 from bushfit.reading.instruments import word_for_part
 from bushfit.reading.labelled import find_labels
 from bushfit.reading.layout import Layout
-from bushfit.reading.lines import Line, is_comment, is_row, is_summary_row
+from bushfit.reading.lines import is_comment, is_row, is_summary_row
 from bushfit.reading.measurement import Floats
-from bushfit.reading.names import Labels, is_remark, labels_and_text_above
+from bushfit.reading.names import Labels, labels_and_text_above
 from bushfit.reading.numerals import Numerals, find_first_decimal, find_numerals, is_like_number
 from bushfit.reading.parts import OpenedFile
 from bushfit.reading.rejected import (
@@ -45,10 +44,6 @@ _FIRST = 1000
 _MOST_TEXT_ROWS = 8
 #: Number of first rows that show whether a file is a table of numbers.
 _FEW_ROWS = 4
-#: Mark of a footnote in a header, such as "Amplitude¹ [mm]".
-_FOOTNOTE_MARK = re.compile("[\u00b9\u00b2\u00b3\u2074\u2020\u2021]")
-#: Largest number of characters of a remark that is quoted.
-_LONGEST_QUOTE = 100
 #: Rows that are converted at a time if pandas cannot read them; chosen: their texts take a few MiB.
 _CHUNK_ROWS = 1 << 16
 
@@ -92,6 +87,15 @@ class Table:
     first_decimal = cached_property(find_first_decimal)
     #: Columns that state direction, specimen_number and run of each row: index and texts, (n,), by these keys.
     row_labels = cached_property(find_labels)
+    #: Non-empty lines above the table, and notes below it.
+    lines_above = cached_property(find_lines_above)
+    #: Warnings on lines above the table, marked rows and hidden rows that may change what the test means.
+    remarks = cached_property(find_remarks)
+
+    @cached_property
+    def labels_above(self) -> Labels:
+        """Labels in the lines above the table, such as a temperature."""
+        return labels_and_text_above(self.lines_above)
 
     @property
     def file(self) -> Path:
@@ -257,43 +261,6 @@ class Table:
             f'column "{column.header}"' if column else None,
         ]
         return ", ".join(part for part in parts if part) or None
-
-    @cached_property
-    def lines_above(self) -> list[Line]:
-        """Non-empty lines above the table, and notes below it; a footnote is behind the header that refers to it."""
-        not_above = (self.layout.header_line, self.layout.units_line)
-        last = self.layout.lines_before_data
-        lines = [line for line in self.source.head() if line.number <= last and line.number not in not_above]
-        marks = {mark: header for header in self.headers for mark in _FOOTNOTE_MARK.findall(header)}
-        for line in self.source.tail():
-            cells = list(map(str, cells_of(line, self.layout.delimiter)))
-            is_note = not (any(map(is_like_number, cells)) or is_summary_row(cells) or self.layout.is_repeated(cells))
-            if line.number > self.layout.lines_before_data and is_note:
-                mark = line.text[:1]
-                lines.append(Line(line.number, f"{marks[mark]}: {line.text[1:]}") if mark in marks else line)
-        return lines
-
-    @cached_property
-    def labels_above(self) -> Labels:
-        """Labels in the lines above the table, such as a temperature."""
-        return labels_and_text_above(self.lines_above)
-
-    @cached_property
-    def remarks(self) -> tuple[Caveat, ...]:
-        """Warnings on lines above the table, marked rows and hidden rows that may change what the test means."""
-        remarks = ((line.number, line.text[:_LONGEST_QUOTE]) for line in self.lines_above if is_remark(line.text))
-        warnings = [Caveat("remark", f'line {number} is not understood: "{text}"') for number, text in remarks]
-        rows = [] if all(is_like_number(str(cell)) for cell in self.first_row) else self.first_rows
-        texts = Counter(cell for row in rows for cell in row if isinstance(cell, str) and cell[:1].isalpha())
-        warnings += [
-            Caveat("marked_rows", f'{count} rows are marked "{cell[:_LONGEST_QUOTE]}"')
-            for cell, count in texts.items()
-            if is_remark(cell)
-        ]
-        if hidden := [number for number in self.source.hidden if number > self.layout.header_line]:
-            sentence = f"{len(hidden)} rows from row {hidden[0]} on are hidden in the workbook, but are read"
-            warnings.append(Caveat("hidden_rows", sentence))
-        return tuple(warnings)
 
     def agrees(self, role: str, expected: str) -> bool:
         """True if a column has a role such as "force", and a unit with the dimension of the unit `expected`."""
