@@ -30,7 +30,7 @@ _ALPHA = np.linspace(0.05, 0.6, 10)
 #: Values of eps_half that are tried before any fit: those of all filled rubbers, with a margin of a factor of 2.
 _EPS_HALF = np.geomspace(2e-4, 0.2, 24)
 #: Number of steps into which a cubic spline divides each step of this grid, to find the smallest misfit.
-_FINER = 8
+_FINER = 5
 #: Least relative error of a point before any fit: the error of the grid of values.
 _COARSE = 1e-3
 #: Maximum number of points of a test that are used before any fit: enough to show the shape of its curves.
@@ -197,7 +197,6 @@ class ClaimScreening:
 
     data: PreparedCampaign
     _products: dict[tuple[int, str, Bushing | None], Array] = field(default_factory=dict)
-    _responses: dict[tuple[Bushing | None, Place, bytes, bytes], Array] = field(default_factory=dict)
 
     def best(self, candidates: Sequence[Claim], limit: int) -> list[Claim]:
         """Select the recording mistakes worth a refit: those whose correction may lower the misfit, the best first.
@@ -239,9 +238,8 @@ class ClaimScreening:
             return np.inf
         whole = np.sum(parts, axis=0)
         gram, products, total = whole[:, :3, :3], whole[:, :3, 3], whole[:, 3, 3]
-        scale = np.sqrt(np.einsum("gii->gi", gram)) + 1e-300
-        unit, right = gram / scale[:, :, None] / scale[:, None, :] + _RIDGE * np.eye(3), products / scale
-        explained = np.einsum("gi,gi->g", right, np.linalg.solve(unit, right[..., None])[..., 0])
+        amounts = np.linalg.solve(gram * (1.0 + _RIDGE * np.eye(3)), products[..., None])[..., 0]
+        explained = np.einsum("gi,gi->g", products, amounts)
         misfits = (total - explained).reshape(_EPS_HALF.size, _ALPHA.size)
         return max(float(zoom(misfits, _FINER).min()), 0.0)
 
@@ -263,32 +261,33 @@ class ClaimScreening:
         key = (index, mistake.name if mistake else "", bushing)
         if key not in self._products:
             direction, frequency, amplitude, stiffness, error = _corrected_points(data_set, mistake)
-            columns = self._responses_of(bushing, direction, frequency, amplitude) / (stiffness * error)
+            columns = _responses(bushing, direction, frequency, amplitude) / (stiffness * error)
             wanted = np.broadcast_to(1.0 / error, (len(columns), 1, error.size))
             rows = np.concatenate((columns, wanted), axis=1)
             rows = np.concatenate((rows.real, rows.imag), axis=-1)
             self._products[key] = rows @ rows.transpose(0, 2, 1)
         return self._products[key]
 
-    def _responses_of(self, bushing: Bushing | None, direction: Place, frequency: Array, amplitude: Array) -> Array:
-        """Complex stiffness per unit of mu, m and sigma_fmax for g pairs of alpha and eps_half, (g, 3, n).
 
-        Args:
-            bushing: bushing with its dimensions; None for tests of specimens.
-            direction: direction or specimen.
-            frequency: [Hz], (n,).
-            amplitude: zero-to-peak [m or rad, or strain], (n,).
-        """
-        key = (bushing, direction, frequency.tobytes(), amplitude.tobytes())
-        if key not in self._responses:
-            alpha, eps_half = (axis.reshape(-1, 1) for axis in np.meshgrid(_ALPHA, _EPS_HALF))
-            model = Model.with_defaults(bushing, BASE, {})
-            names = ("mu", "m", "sigma_fmax")
-            none = {**dict.fromkeys(names, 0.0), "alpha": alpha, "eps_half": eps_half}
-            responses = (model.stiffness(direction, frequency, amplitude, values={**none, name: 1.0}) for name in names)
-            shape = alpha.size, frequency.size
-            self._responses[key] = np.stack([np.broadcast_to(response, shape) for response in responses], axis=1)
-        return self._responses[key]
+def _responses(bushing: Bushing | None, direction: Place, frequency: Array, amplitude: Array) -> Array:
+    """Complex stiffness per unit of mu, m and sigma_fmax for g pairs of alpha and eps_half, (g, 3, n).
+
+    Args:
+        bushing: bushing with its dimensions; None for tests of specimens.
+        direction: direction or specimen.
+        frequency: [Hz], (n,).
+        amplitude: zero-to-peak [m or rad, or strain], (n,).
+    """
+    axes = {"mu": {}, "m": {"alpha": _ALPHA[:, None]}, "sigma_fmax": {"eps_half": _EPS_HALF[:, None, None]}}
+    model, shape = Model.with_defaults(bushing, BASE, {}), (_EPS_HALF.size, _ALPHA.size, frequency.size)
+    responses = [
+        model.stiffness(
+            direction, frequency, amplitude, values={**model.values, **dict.fromkeys(axes, 0.0), name: 1.0, **axis}
+        )
+        for name, axis in axes.items()
+    ]
+    columns = np.stack([np.broadcast_to(response, shape) for response in responses], axis=2)
+    return columns.reshape(-1, len(axes), frequency.size)
 
 
 def _corrected_points(data_set: MeasuredTest, mistake: Mistake | None) -> tuple[Place, Array, Array, Array, Array]:
