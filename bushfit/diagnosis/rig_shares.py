@@ -14,7 +14,7 @@ from bushfit.diagnosis.fits import misfit_covariance
 from bushfit.diagnosis.hypotheses import Hypothesis, mean_parameters
 from bushfit.effects import get_effect, qualified_name
 from bushfit.effects.contract import Array, Level, RubberConditions
-from bushfit.effects.unnamed import Patch, Unnamed
+from bushfit.effects.unnamed import Patch
 from bushfit.fitting.problem import FitResult
 from bushfit.geometry import Place
 from bushfit.model.covariance import Covariance
@@ -89,20 +89,18 @@ def _with_stiffness_of(measured: Model, model: Model, places: Mapping[str, Place
         places: tested directions and specimens by name.
     """
     assert measured.unnamed is not None
-    single = [
-        (name, replace(patch, directions=(name,))) for patch in measured.unnamed.patches for name in patch.directions
-    ]
-    unnamed = replace(measured.unnamed, patches=tuple(patch for _, patch in single))
+    single = [replace(patch, directions=(name,)) for patch in measured.unnamed.patches for name in patch.directions]
+    unnamed = replace(measured.unnamed, patches=tuple(single))
     for _ in range(_ITERATIONS):
         model = replace(model, unnamed=unnamed)
         patches = []
-        for (name, _), patch in zip(single, unnamed.patches, strict=True):
-            ratio = _at_nodes(measured, patch, places[name]) / _at_nodes(model, patch, places[name])
+        for patch in unnamed.patches:
+            place = places[patch.directions[0]]
+            ratio = _at_nodes(measured, patch, place) / _at_nodes(model, patch, place)
             share = (1.0 + np.array(patch.in_phase) + 1j * np.array(patch.in_quadrature)) * ratio - 1.0
-            patches.append(
-                replace(patch, in_phase=tuple(share.real.tolist()), in_quadrature=tuple(share.imag.tolist()))
-            )
-        unnamed = Unnamed(unnamed.size, unnamed.lengths, tuple(patches))
+            in_phase, in_quadrature = (tuple(part.tolist()) for part in (share.real, share.imag))
+            patches.append(replace(patch, in_phase=in_phase, in_quadrature=in_quadrature))
+        unnamed = replace(unnamed, patches=tuple(patches))
     return replace(model, unnamed=unnamed)
 
 
