@@ -45,6 +45,19 @@ def test_the_paper_s_order_by_hand(bushfit, tmp_path):
     assert "left out" not in again.stderr
 
 
+def test_the_dynamic_fit_takes_the_smallest_amplitude_of_all_sweeps(own):
+    """Which is in the second of two files."""
+    table = pd.read_csv(own / SWEEP)
+    small = table["amplitude [mm]"] < 0.3
+    table[~small].to_csv(own / SWEEP, index=False)
+    table[small].to_csv(own / "configs/small.csv", index=False)
+    with (own / CAMPAIGN).open("a", encoding="utf-8") as campaign:
+        campaign.write('\n[[sweeps]]\nfile = "small.csv"\ndirection = "axial"\n')
+    typing(own)("fit-dynamic", CAMPAIGN, "-o", "x", "--no-plots")
+    fitted = [test for test in document(own / "x/dynamic.json")["fit"]["tests"] if test["fitted"]]
+    assert [(test["test"], test["points"]) for test in fitted] == [("small", 48)]
+
+
 @pytest.mark.parametrize(
     ("off", "tilted", "told"), [(0.0, False, []), (0.05, False, [REPEATS_OFF]), (0.13, True, [ROWS_APART, REPEATS_OFF])]
 )
