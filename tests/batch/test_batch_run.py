@@ -129,6 +129,7 @@ def test_a_parameter_on_a_bound_of_its_fit_passes_on_condition_and_is_named(type
     assert (good["limits"], held["limits"], other["limits"]) == ("pass", "conditional pass", "pass")
     assert good["at bound"] == ""
     assert "mu (max)" in held["at bound"]
+    assert "mu is at the max given in [fit]" in held["warnings"]
     assert "at the max bound of the fit" in held["undecided limits"]
     assert "warning: at a bound of the fit, because the tests do not determine them: " in done.stderr
     assert "mu of b1" in done.stderr

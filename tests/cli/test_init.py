@@ -120,7 +120,7 @@ def test_a_direction_that_is_stated_contradicts_no_file(typed, tests, tmp_path, 
     for command in (("init", "bench", *GEOMETRY), ("init", file, *GEOMETRY), ("inspect", file, "--no-plots")):
         done = typed(*command, "--direction", other, "-o", "x", status=2)
         refused(done, tmp_path / "x", "leave --direction out")
-        assert re.search(rf"{name}, .* says? {says}, but --direction says {other}\n", done.stderr)
+        assert re.search(rf"{name}, .* says? {says}, but --direction says {other}\n  found: {name}, ", done.stderr)
     typed("init", file, *GEOMETRY, "--direction", says, "-o", "x")
     typed("init", "bench/plain.csv", *GEOMETRY, "--direction", other, "-o", "y")
 

@@ -100,6 +100,8 @@ def test_parameters_meet_the_truth_and_are_the_same_in_all_files(lab):
     printed = json.loads(done.stdout)["parameters"]
     saved = json.loads((folder / "fit/model.json").read_text(encoding="utf-8"))
     assert printed == saved["parameters"]
+    record = "sim/loop_rear left axial_2.csv"
+    assert [entry["file"] for entry in saved["provenance"]["inputs"]].count(record) == 1, "of two loops"
     covariance = dict(zip(saved["covariance"]["names"], np.diag(saved["covariance"]["matrix"]), strict=True))
     known = {**vars(RUBBER), **EFFECTS}
     assert set(printed) == {*known, "rig_compliance.compliance"}
@@ -200,6 +202,9 @@ def test_a_measured_record_is_met_by_respond_and_validation(lab):
     names = ("NRMSE [%]", "peak gap [%]", "energy gap [%]", "points in band [%]")
     assert numbers(line(done, "record_front axial  "))[-4:] == pytest.approx([row[name] for name in names], rel=0.01)
     assert "mount 7: consistent" in done.text
+    missed = "rear 40 degC, rear left radial, was not fitted, and the model misses it by 5."
+    assert missed in done.text
+    assert "bushfit fit CAMPAIGN --direction axial --direction radial" in done.text
     model = json.loads((folder / "run/model.json").read_text(encoding="utf-8"))["parameters"]
     page = parsed((folder / "run/report.html").read_text(encoding="utf-8")).text
     assert f"{1e-6 * model['mu']['value']:.4f}" in page

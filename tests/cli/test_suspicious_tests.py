@@ -36,6 +36,9 @@ def test_copies_count_once(bushfit, own, once, command):
     assert f"{2 * len(sweep)} points of repeats 2 and 3 are exact copies of an earlier repeat" in done.stderr
     looked = bushfit("inspect", own / LOOP, (own / LOOP).with_name("again.csv"), "--no-plots", "-o", own / "i").stderr
     assert looked.count("the same data are in") == 2
+    (own / SWEEP).with_name("axial_again.csv").write_bytes((own / SWEEP).read_bytes())
+    looked = bushfit("inspect", own / SWEEP, (own / SWEEP).with_name("axial_again.csv"), "--no-plots", "-o", own / "s")
+    assert looked.text.count("the same data are in") == 2
     single, copied = (load_result(own / folder / "model.json") for folder in ("once", "copied"))
     assert vars(copied.model)["values"] == vars(single.model)["values"]
     assert copied.covariance.stderr("m") == single.covariance.stderr("m")

@@ -76,21 +76,6 @@ def test_the_mean_over_seeds_is_the_truth(rig, models, name, seeds):
     assert np.all(np.abs(np.mean(two_step, axis=0)) < 3.0 * two_step_error + 2e-3)
 
 
-def test_radial_sweep_follows_from_axial_tests(measured, result):
-    """The paper's claim: within 3 % in magnitude and 0.01 in loss factor of the means over the repeats."""
-    (sweep,) = [data_set.test for data_set in measured.sweeps if data_set.direction is Direction.RADIAL]
-    points = np.stack((sweep.frequency, sweep.amplitude))
-    (frequency, amplitude), place, count = np.unique(points, axis=1, return_inverse=True, return_counts=True)
-    mean = (np.bincount(place, sweep.stiffness.real) + 1j * np.bincount(place, sweep.stiffness.imag)) / count
-    found = result.model.stiffness(Direction.RADIAL, frequency, amplitude)
-    magnitude = np.max(np.abs(np.abs(found / mean) - 1.0))
-    loss = np.max(np.abs(found.imag / found.real - mean.imag / mean.real))
-    print(f"radial from axial: {count.size} points, magnitude within {100 * magnitude:.2f} %, loss factor {loss:.4f}")
-    assert count.size == 48
-    assert magnitude < 0.03
-    assert loss < 0.01
-
-
 def test_errors_of_held_parameters_are_carried_over(measured, result):
     carried, sharp = fit_dynamic(measured, result), fit_dynamic(measured, Result(result.model))
     for name, most in (("m", 0.02), ("alpha", 0.01)):

@@ -10,13 +10,11 @@ from scipy.stats import f as fisher
 from scipy.stats import t as student
 
 from bushfit.campaign.simulated import SimulatedLoop, SimulatedSweep, SimulateSettings
-from bushfit.commands.compare import compare as compare_results
-from bushfit.commands.compare import compared_result
 from bushfit.effects.contract import Array
 from bushfit.geometry import Direction
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import FIVE, Model
-from bushfit.model.result import Range, Result
+from bushfit.model.result import Result
 from bushfit.prediction.bands import Band
 from bushfit.prediction.comparison import Comparison, compare, with_holm
 from bushfit.prediction.parameter_comparison import ParameterContrast
@@ -175,18 +173,3 @@ def test_m_is_compared_at_a_frequency_where_alpha_is_free_and_alone_where_it_is_
     assert list(found) == list(FIVE)
     assert found["m"].p == pytest.approx(1.0)
     assert found["alpha"].note == "fixed in both"
-
-
-def mu_alone(model: Model, frequency: tuple[float, float], displacement: tuple[float, float]) -> Result:
-    low, high = (x * model.unit_strain(Direction.AXIAL) for x in displacement)
-    covariance = Covariance(("mu",), np.array([[1e6]]))
-    return Result(model, fitted=("mu",), covariance=covariance, measured=Range(frequency, (low, high), ("axial",)))
-
-
-def test_the_warning_names_the_result_that_is_extrapolated(paper_model):
-    inside, outside = (mu_alone(paper_model, ends, (1e-4, 1e-3)) for ends in ((5.0, 155.0), (200.0, 300.0)))
-    output = compare_results(compared_result(inside, "one.json"), compared_result(outside, "two.json"))
-    assert any(
-        line.startswith("B: axial: predicted at frequencies of 5 to 155 Hz") for line in map(str, output.warnings)
-    )
-    assert not any(line.startswith("A: axial: predicted") for line in map(str, output.warnings))

@@ -141,16 +141,3 @@ def test_a_band_that_lacks_the_error_of_a_formula_says_so(result, bushing, direc
     found = predict(replace(result, model=model, measured=reach), Direction(direction), [5.0], [1e-6]).warnings
     assert len(found) == len(said)
     assert all(part in line.text for part, line in zip(said, found, strict=True)), found
-
-
-def test_a_resonance_says_what_its_peak_extrapolates(result):
-    """Frequencies and strains near the peak count, not those far from it; so does a place that was not fitted."""
-    inside = predict_resonance(result, Direction.AXIAL, 3.0, 20.0, None)
-    assert inside.frequency[-1] > 155.0, "beyond what was fitted, but far from the peak"
-    assert inside.peak[0] == pytest.approx(75.0, rel=0.2)
-    assert inside.warnings == ()
-    fast, low = predict_resonance(result, Direction.AXIAL, 0.2, 0.1, None).warnings
-    assert fast.text.startswith("axial, resonance of 0.2 kg: predicted at frequencies of ")
-    assert low.text.startswith("axial, resonance of 0.2 kg: predicted at strains of ")
-    fitted, *_ = predict_resonance(result, Direction.RADIAL, 3.0, 20.0, None).warnings
-    assert fitted.text.startswith("radial: not fitted")

@@ -7,17 +7,12 @@ import numpy as np
 import pandas as pd
 import pytest
 from kinds import SIZES, Bench, largest, sized
-from lab_campaign import KINDS, RUBBERS, OtherRubber, a_specimen, campaign
+from lab_campaign import KINDS
 from rubber_card import evaluate
-from time_rig import DIRECTIONS, Bushing, Rubber, Tests, friction, respond
-
-from bushfit import geometry
-from bushfit.effects import BASE
-from bushfit.model.model import Model
+from time_rig import DIRECTIONS, Bushing, Rubber, Tests, respond
 
 RUBBER = Rubber(1.09e6, 2.0e5, 0.24, 1.46e4, 1.3e-2)
 CMP = Bushing(0.010, 0.018, 0.034)
-PHASE = 2.0 * np.pi * np.arange(512) / 512
 
 
 def a_session() -> Tests:
@@ -43,14 +38,6 @@ def test_a_kind_comes_in_three_sizes(name):
         assert 0.5 * size < found < 2.0 * size
 
 
-@pytest.mark.parametrize("name", ["", "row_shift"])
-def test_the_same_seed_writes_the_same_campaign(name, tmp_path):
-    first, second = (campaign(name, 0.04, 3, tmp_path / each) for each in "ab")
-    assert first == second
-    for file in (tmp_path / "a").iterdir():
-        assert file.read_bytes() == (tmp_path / "b" / file.name).read_bytes()
-
-
 def points(bushing: Bushing, frequency: object, amplitude: object, direction: object) -> Tests:
     f, x, d = (np.atleast_1d(values) for values in np.broadcast_arrays(frequency, amplitude, direction))
     nothing = np.zeros(f.size, int)
@@ -69,47 +56,6 @@ def test_it_measures_the_table_of_the_paper_s_bushing(root):
 def test_it_has_eq_11_of_every_shape(root):
     for inner, outer, length, _, equation in pd.read_csv(root / "data/reference/radial_fe.csv").to_numpy():
         assert Bushing(inner / 1e3, outer / 1e3, length / 1e3).stiffness("radial") == pytest.approx(equation, rel=1e-5)
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_bushfit_s_closed_form_meets_it(seed):
-    bushing, rubber = a_specimen(np.random.default_rng(seed))
-    model = Model(geometry.Bushing("any", bushing.inner, bushing.outer, bushing.length), BASE, vars(rubber))
-    frequency, amplitude = np.geomspace(0.1, 200.0, 12), np.geomspace(1e-5, 1e-3, 12)
-    for number, name in enumerate(DIRECTIONS[:2]):
-        measured = respond(points(bushing, frequency, amplitude, number), rubber).stiffness
-        closed = model.stiffness(geometry.Direction(name), frequency, amplitude)
-        assert np.max(np.abs(measured / closed - 1.0)) < 2e-4
-
-
-def test_friction_with_further_turns_is_that_walked_from_rest():
-    wave = 0.01 * (np.cos(PHASE) + 0.5 * np.cos(3.0 * PHASE))
-    largest, half = 2.0e4, 0.008
-    turn, turned, before, stress, sense = 0.0, 0.0, 0.0, 0.0, 0.0
-    walked = []
-    for value in np.tile(wave, 60):
-        now = np.sign(value - before)
-        if now and now != sense:
-            turn, turned, sense = before, stress, now
-        gone = value - turn
-        if sense:
-            stress = turned + gone * (largest - sense * turned) / (
-                half * (1.0 - sense * turned / largest) + sense * gone
-            )
-        walked.append(stress)
-        before = value
-    assert np.allclose(friction(wave[None, :], largest, half)[0], walked[-512:], atol=1e-5 * largest)
-
-
-@pytest.mark.parametrize("rubber", RUBBERS)
-def test_every_rubber_is_stiffer_when_fast_and_softer_when_far(rubber):
-    law = OtherRubber(RUBBERS[rubber](np.random.default_rng(3)), 1e6)
-    frequency, amplitude = np.array([5.0, 100.0, 5.0]), np.array([1e-4, 1e-4, 5e-4])
-    tests = points(CMP, frequency, amplitude, 0)
-    slow, fast, far = respond(tests, law).stiffness
-    assert abs(far) < abs(slow) < abs(fast)
-    for value in (slow, fast, far):
-        assert 0.02 < value.imag / value.real < 0.3
 
 
 def test_a_campaign_is_evaluated_as_by_its_user():
