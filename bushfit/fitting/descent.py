@@ -140,9 +140,9 @@ class Descent:
                 step, expected = fit._step(damping)
                 bend = fit._bend(step, damping)
             point = np.clip(fit.point + step + bend, *fit._reach)
-            has_failed, growth = fit.growth > _FIRST_GROWTH, 2.0 * fit.growth
-            fit = replace(fit, damping=damping * fit.growth, growth=growth)
-            fit = replace(fit, evaluations=fit.evaluations + 1, converged=converged)
+            has_failed, after_failure = fit.growth > _FIRST_GROWTH, (damping * fit.growth, 2.0 * fit.growth)
+            state = fit.evaluations + 1, converged, *after_failure
+            fit = Descent(fit.best, fit.point, fit.tolerance, *state, fit.last)
             try:
                 model = fit.best.model.with_values(problem.coordinates.values(point))
                 with np.errstate(invalid="ignore", divide="ignore", over="ignore"):

@@ -13,7 +13,7 @@ from bushfit.reading.measurement import Sweep
 
 #: Tolerance of the fit of a sweep's individual shift factor, far below its error.
 _ACCURACY = 1e-12
-#: Step of ln frequency for slopes.
+#: Step of the shift parameter for its slope, in standard errors.
 _APART = 1e-3
 #: Frequencies from which on a sweep can be shifted along them.
 _FREQUENCIES = 3
@@ -61,7 +61,7 @@ def master_curve(result: Result, sweeps: Sequence[MeasuredSweep]) -> tuple[Shift
             at_reference = model.stiffness(sweep.direction, sweep.frequency * pace, sweep.amplitude)
             reduced = sweep.measured * at_reference / sweep.response(model)
             temperature = float(np.mean(sweep.temperature))
-            shift, error = (float(value.item()) for value in shift_factors(result, np.array([temperature])))
+            shift, error = _shift_by_law(result, temperature)
             further, unsure = _further_shift(model, sweep)
             laws = (shift, error), (shift + further, unsure)
             curves.append(ShiftedSweep(sweep, temperature, *laws, sweep.frequency * pace, reduced))
@@ -73,21 +73,17 @@ def can_shift(sweep: Sweep) -> bool:
     return sweep.temperature is not None and np.unique(sweep.frequency).size >= _FREQUENCIES
 
 
-def shift_factors(result: Result, temperature: Array) -> tuple[Array, Array]:
-    """Fitted shift factors ln a_T at temperatures [K], (n,), with standard errors; nan if these are unknown.
-
-    Returns:
-        ln a_T and its standard error, (n,) each.
-    """
-    value, error = result.model.values[SHIFT], result.covariance.stderr(SHIFT)
-    step = _APART * (error or np.nan)
-
-    def shift(shift_value: float) -> Array:
-        """Natural log of the shift factors at the temperatures, for one value of the shift parameter, (n,)."""
-        return np.log(result.model.with_values({SHIFT: shift_value}).shift_factor(RubberConditions(temperature)))
-
-    slope = (shift(value + step) - shift(value - step)) / (2.0 * step) if error else np.full(temperature.shape, np.nan)
-    return shift(value), np.abs(slope) * (error or np.nan)
+def _shift_by_law(result: Result, temperature: float) -> tuple[float, float]:
+    """Fitted shift factor ln a_T at a temperature [K], and its standard error; nan if the error is unknown."""
+    value, error, conditions = (
+        result.model.values[SHIFT],
+        result.covariance.stderr(SHIFT),
+        RubberConditions(temperature),
+    )
+    values = (value + share * (error or 0.0) for share in (-_APART, 0.0, _APART))
+    factors = [result.model.with_values({SHIFT: value}).shift_factor(conditions) for value in values]
+    low, middle, high = np.log(factors).tolist()
+    return middle, abs(high - low) / (2.0 * _APART) if error else np.nan
 
 
 def _further_shift(model: Model, sweep: MeasuredSweep) -> tuple[float, float]:

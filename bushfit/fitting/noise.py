@@ -152,9 +152,8 @@ def sweep_noise(sweeps: Sequence[Sweep], rig: RigSettings = UNSTATED) -> SweepNo
         for key, variance in variances.items()
     }
     if repeated:
-        freedom = max(round(sum(line.shared_freedom for line in repeated)), _ENOUGH)
+        freedom, excesses = max(round(sum(line.shared_freedom for line in repeated)), _ENOUGH), dict[str, Caveat]()
         largest = np.maximum(largest_error(rig), largest_error(UNSTATED))  # [rig] states what repeats share
-        excesses = dict[str, Caveat]()
         for name in by_name:
             error = _shared_errors([line for key, line in lines.items() if key[0] == name], rig)
             if np.any(error > largest):

@@ -14,7 +14,7 @@ from bushfit.campaign.session import measured_session
 from bushfit.caveat import Caveat
 from bushfit.effects import BASE, effect_name_of, get_effect, with_base
 from bushfit.errors import FitError, ModelError, error_location
-from bushfit.fitting.assess import check_strain, mixed_condition_warnings
+from bushfit.fitting.assess import check_strain, mixed_condition_warnings, reduced_chi_square
 from bushfit.fitting.coordinates import Bounds
 from bushfit.fitting.design import start_with_effects
 from bushfit.fitting.preload import with_preload
@@ -190,8 +190,7 @@ class PreparedCampaign:
         chi_squares = np.full(len(models), np.inf)
         for i, model in enumerate(models if len(models) > 1 else ()):
             with suppress(ModelError), np.errstate(all="ignore"):
-                rows = np.concatenate([test.residual(model) for test in data_sets])
-                chi_squares[i] = np.nan_to_num(rows @ rows, nan=np.inf)
+                chi_squares[i] = np.nan_to_num(reduced_chi_square(model, data_sets, 0)[0], nan=np.inf)
         best = int(np.argmin(chi_squares))
         named = {effect_name_of(name) for name in given_values}
         added = [name for name in effects if name not in BASE and name not in named]
