@@ -84,22 +84,22 @@ def covariance(
         basis = np.linalg.qr(slope[equations].T)[0]
         system[equations] = basis.T @ slope.T
         excess = np.ones(len(basis))  # 1 in the rows of priors
+        blocks = list(zip(stage.tests, residual_slices(stage.tests), strict=True))
         if not smooth_error:
             of_all = lack_of_fit(model, stage.tests, len(stage.names)) or 1.0
-            for test, rows in zip(stage.tests, residual_slices(stage.tests), strict=True):
+            for test, rows in blocks:
                 excess[rows] = max(of_all, lack_of_fit(model, [test], 0) or 1.0)
         share = basis.T * np.sqrt(excess)
         root[equations, equations] = np.linalg.qr(share.T)[1].T
-        bases.append((equations, share))
+        bases.append((equations, share, blocks))
         begin = equations.stop
     reaction = _inverse(system)
     by_value, reaction = (reaction @ root) * slopes[:, None], reaction * slopes[:, None]
     carried = reaction[:, : len(fixed.names)] / slopes[: len(fixed.names)]
     matrix, spread = by_value @ by_value.T, [carried @ part @ carried.T for part in fixed.spread]
     by_noise = dict[Hashable, tuple[Array, Array]]()
-    for stage, (equations, basis) in zip(stages, bases, strict=True):
+    for equations, basis, blocks in bases:
         influence = reaction[:, equations] @ basis
-        blocks = list(zip(stage.tests, residual_slices(stage.tests), strict=True))
         if smooth_error:  # beside it the error of the noise is the least part
             changes = influence[:, : smooth_error.columns.shape[1]] @ smooth_error.columns.T
             added = changes @ changes.T
@@ -110,7 +110,7 @@ def covariance(
             if isinstance(test, MeasuredLoop) and not test.gain_weighs:  # which the weights do not count
                 change = test.gain_error * (influence[:, rows] @ test.gain_and_offset()[0])
                 matrix = matrix + np.outer(change, change)
-        for variance, (change, lost) in _changes_by_noise(stage.tests, influence, basis).items():
+        for variance, (change, lost) in _changes_by_noise(blocks, influence, basis).items():
             changes, losses = by_noise.get(variance, (0.0, 0.0))
             by_noise[variance] = changes + change, losses + lost
     for change, lost in by_noise.values():
@@ -125,12 +125,12 @@ def covariance(
 
 
 def _changes_by_noise(
-    data_sets: Sequence[MeasuredTest], influence: Array, basis: Array
+    blocks: Sequence[tuple[MeasuredTest, slice]], influence: Array, basis: Array
 ) -> dict[Hashable, tuple[Array, Array]]:
     """Changes of the parameters' covariance by errors of the estimated noise variances, by name of the variance.
 
     Args:
-        data_sets: tests of one fit.
+        blocks: tests of one fit, with the slice of the residuals of each.
         influence: change of each of the k parameters per unit of each of the n whitened residuals, (k, n).
         basis: r orthogonal rows that span the Jacobian of the parameters of this fit, (r, n).
 
@@ -139,7 +139,7 @@ def _changes_by_noise(
         covariance that the then wrong weights of the fit add, (k, k) each.
     """
     unit, sums = basis / np.linalg.norm(basis[0]), dict[Hashable, list[Array]]()
-    for test, rows in zip(data_sets, residual_slices(data_sets), strict=True):
+    for test, rows in blocks:
         of_test = influence[:, rows]
         for variance, move in test.noise_sensitivity(of_test).items():
             products = [move @ of_test.T, move @ move.T, move @ unit[:, rows].T]

@@ -104,8 +104,7 @@ def undetermined_parameters(
         return []
     _, slopes = FitProblem(model, data_sets, names).linearise(model)
     slopes = slopes[:, : sum(test.size for test in data_sets)] * relative_sizes(model, names)[:, None]
-    directions = _error_directions(slopes)
-    groups, lines = _groups(names, directions), list[Caveat]()
+    (rows, groups), lines = _open_groups(names, slopes), list[Caveat]()
     changes = np.abs(Coordinates.of_parameters(model, names).slopes(model.values) * relative_sizes(model, names))
     stderr = {name: covariance.stderr(name) or 0.0 for name in names}
     errors = {name: stderr[name] / float(change) for name, change in zip(names, changes, strict=True)}
@@ -113,22 +112,18 @@ def undetermined_parameters(
     neutral = {name: value for name in names if (value := model.parameters[name].neutral) is not None}
     idle = {name for name in neutral if "." in name and abs(model.values[name] - neutral[name]) < Z95 * stderr[name]}
     if zero := [name for group in groups for name in group if name in idle]:
-        unseen = {effect_name_of(name) for name in zero} - {
-            effect_name_of(name) for name in neutral if name not in idle
-        }
+        unseen = {effect_name_of(name) for name in zero} - {*map(effect_name_of, neutral.keys() - idle)}
         for name in zero:
             effect = effect_name_of(name)
             remark = f": these tests do not show {effect}" * (effect in unseen)
             lines.append(Caveat("no_difference", f"{name} does not differ from {neutral[name]:g}{remark}"))
-        is_shown = [name not in zero and effect_name_of(name) not in unseen for name in names]
-        names = [name for name, keep in zip(names, is_shown, strict=True) if keep]
-        if not names:
+        shown = [i for i, name in enumerate(names) if name not in zero and effect_name_of(name) not in unseen]
+        if not shown:
             return lines
-        directions = _error_directions(slopes[is_shown])
-        groups = _groups(names, directions)
+        rows, groups = _open_groups([names[i] for i in shown], slopes[shown])
     if not groups:
         return []
-    combinations, rows = dict[str, None](), dict(zip(names, directions, strict=True))
+    combinations = dict[str, None]()
     for group in groups:
         listed = ", ".join(f"{name} {_percent(errors[name])}" for name in group)
         reasons = "; ".join(_reasons(model, data_sets, group)) or "these tests do not determine"
@@ -153,30 +148,23 @@ def _percent(error: float) -> str:
     return f"{float(f'{100.0 * error:.2g}'):g} %" if error < _BEYOND else "beyond 1000 %"
 
 
-def _error_directions(slopes: Array) -> Array:
-    """Independent errors of the parameters: eigenvectors of their covariance, times the standard error of each.
+def _open_groups(names: Sequence[str], slopes: Array) -> tuple[dict[str, Array], list[list[str]]]:
+    """Independent errors of the parameters, and groups of the parameters that the tests do not determine.
 
-    Args:
-        slopes: derivatives of the n whitened residuals with respect to relative changes of k parameters, (k, n).
-
-    Returns:
-        Relative change of each parameter due to each of the k independent errors, (k, k), one column per error. The sum
-        of squares along a row is the variance of a parameter; the sum of the columns' outer products is the covariance.
-    """
-    values, vectors = np.linalg.eigh(slopes @ slopes.T)
-    return np.asarray(vectors / np.sqrt(np.maximum(values, np.finfo(float).eps * values.max())))
-
-
-def _groups(names: Sequence[str], directions: Array) -> list[list[str]]:
-    """Group the names of the parameters that the tests do not determine.
-
-    An open direction is a combination of parameters with a large standard error. The parameters of one open direction,
-    and of all open directions that have a parameter in common with it, form a group.
+    The independent errors are the eigenvectors of the covariance, times the standard error of each. An open direction
+    is one with a large standard error. The parameters of one open direction, and of all open directions that have a
+    parameter in common with it, form a group.
 
     Args:
         names: names of the k parameters.
-        directions: result of `_error_directions`, (k, k).
+        slopes: derivatives of the n whitened residuals with respect to relative changes of the parameters, (k, n).
+
+    Returns:
+        By name, the relative change of a parameter due to each of the k independent errors, (k,); the sum of its
+        squares is the variance of the parameter. And the names of the parameters in each group.
     """
+    values, vectors = np.linalg.eigh(slopes @ slopes.T)
+    directions = vectors / np.sqrt(np.maximum(values, np.finfo(float).eps * values.max()))
     groups: list[set[str]] = []
     for parts in np.abs(directions.T[np.linalg.norm(directions, axis=0) > _OPEN]):
         threshold = min(_OPEN, _PARTNER * float(parts.max()))
@@ -185,7 +173,7 @@ def _groups(names: Sequence[str], directions: Array) -> list[list[str]]:
             groups.remove(overlapping)
             group |= overlapping
         groups.append(group)
-    return [[name for name in names if name in group] for group in groups]
+    return dict(zip(names, directions, strict=True)), [[name for name in names if name in group] for group in groups]
 
 
 def _reasons(model: Model, data_sets: Sequence[MeasuredTest], involved: Sequence[str]) -> Iterator[str]:

@@ -354,19 +354,19 @@ class MeasuredLoop(MeasuredBase):
         The errors are the cosine and sine of each harmonic and an offset; for a loop from rest, also a deviation of the
         first cycle and a drift.
         """
-        count, phase = 1 if self.fundamental_only else _ERROR_HARMONICS, self.phase
-        waves = basis(phase, count).T[1:] * np.tile(_ERROR_SIZES[:count], 2)[:, None]
-        if self.from_rest and not self.fundamental_only:  # the first cycle has its error and a drift
+        phase = self.phase
+        waves = basis(phase, _ERROR_HARMONICS).T[1:] * np.tile(_ERROR_SIZES, 2)[:, None]
+        if self.from_rest:  # the first cycle has its error and a drift
             order = np.arange(2.0 * np.ceil(self.cycles))[:, None]
             drift = np.cos(np.pi * order * phase / self.cycles) / (1.0 + order)
             waves = np.concatenate((waves, waves * (phase < 1.0), drift))
         rows = self._whiten_rows(waves * (self._per_noise * self.half_range))
         if not self.first_harmonic_errs:
-            rows[[0, count]] = 0.0
+            rows[[0, _ERROR_HARMONICS]] = 0.0
         return SharedErrors.from_columns(np.concatenate((rows, _ERROR_SIZES[:1, None] * self._unit_offset)))
 
     def noise_sensitivity(self, influence: Array) -> dict[Hashable, Array]:
-        """Change of k parameter estimates by an error of each noise variance that was estimated from the tests.
+        """Change of k parameter estimates by an error of each noise variance that was estimated from all rows.
 
         `influence`: change of each estimate per unit of each whitened residual, (k, size).
 
@@ -375,10 +375,7 @@ class MeasuredLoop(MeasuredBase):
             the variance.
         """
         reaction = self.shared_errors.whiten(influence)
-        whole = reaction @ self._fundamental.T if self.fundamental_only else reaction
-        parts = self.row_noise.noise_sensitivity(whole)
-        if self.fundamental_only:
-            parts = [part @ self._fundamental for part in parts]
+        parts = self.row_noise.noise_sensitivity(reaction)
         if not parts and self.test.noise is None:
             rows = round(self.row_noise.observed_share * np.count_nonzero(self._usable_rows))
             parts = [np.sqrt(2.0 / rows) * reaction]

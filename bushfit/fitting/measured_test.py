@@ -70,17 +70,13 @@ class MeasuredBase(ABC):
     def residual_of(self, response: Array) -> Array:
         """Whitened residuals, (..., size), of a modelled `response`, (..., n): modelled minus measured."""
 
-    def residual(self, model: Model, values: Values | None = None) -> Array:
+    def residual(self, model: Model) -> Array:
         """Whitened residuals: model minus measured in units of noise; independent with variance 1 for a true model.
 
-        Args:
-            model: model to evaluate.
-            values: parameter values in place of the model's; leading axes are added to the result.
-
         Returns:
-            Residuals in the force of each row, (..., size); of a sweep of n points, n gains, then n phases.
+            Residuals in the force of each row, (size,); of a sweep of n points, n gains, then n phases.
         """
-        return self.residual_of(self.response(model, values))
+        return self.residual_of(self.response(model))
 
     @property
     @abstractmethod

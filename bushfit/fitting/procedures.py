@@ -322,11 +322,7 @@ def build_result(
     priors = {name: use for step in steps for name, use in prior_uses(step, cov).items()}
     warnings = [*notes, *prior_warnings(priors)]
     for step in steps:
-        limited, limits = replace(step, problem=replace(step.problem, bounds=bounds)), dict[str, float | None]()
-        for name, end in step.at_bound.items():
-            if bounds.get(name, (None, None))[end == "max"] is None:
-                limits[name] = find_limit(limited, name, "max" if end == "min" else "min")
-        warnings += fit_warnings(last.model, step, limits, cov)
+        warnings += fit_warnings(last.model, step, bounds, cov)
     return Result(
         model,
         tuple(name for name in names if not (bounded_is_fixed and name in at_bound)),
@@ -342,16 +338,14 @@ def build_result(
     )
 
 
-def fit_warnings(
-    model: Model, step: FitResult, limits: Mapping[str, float | None], covariance: Covariance
-) -> Iterator[Caveat]:
+def fit_warnings(model: Model, step: FitResult, bounds: Bounds, covariance: Covariance) -> Iterator[Caveat]:
     """Yield warnings about the tests of a fit, parameters at bounds, parameters not determined, and a misfit.
 
     Args:
         model: fitted model.
         step: result of the fit, one step of a procedure.
-        limits: one-sided 95 % limits [SI] of the parameters that ended at a bound of the model, not of the campaign, by
-            name; None for a parameter that the tests do not limit.
+        bounds: limits of parameters that the campaign gives, by name [SI]; for a parameter that ended at another bound,
+            the warning states the one-sided 95 % limit that the tests set.
         covariance: covariance of the fitted parameters.
     """
     tests, names, at_bound = step.data_sets, step.names, step.at_bound
@@ -371,11 +365,11 @@ def fit_warnings(
         sentence = f"the fit was stopped after {step.evaluations} evaluations of the model"
         yield Caveat("fit_stopped", f"{sentence}, because chi-square hardly fell: some parameters are undetermined")
     for name, end in at_bound.items():
-        if name not in limits:
+        if bounds.get(name, (None, None))[end == "max"] is not None:
             yield Caveat("given_bound", f"{name} is at the {end} given in [fit]")
             continue
-        shown = "the data do not determine it"
-        if (limit := limits[name]) is not None:
+        shown, limited = "the data do not determine it", replace(step, problem=replace(step.problem, bounds=bounds))
+        if (limit := find_limit(limited, name, "max" if end == "min" else "min")) is not None:
             unit, factor = display_unit(step.model.parameters[name].unit, 1.0, limit)
             how = f"at {'most' if end == 'min' else 'least'} {number(factor * limit, 2)} {unit}".rstrip(" -")
             shown = f"the tests only show that it is {how} (95 %)"
