@@ -228,12 +228,13 @@ def quality(model: Model, data_sets: Sequence[MeasuredTest], parameters: int) ->
     Returns:
         Figures over all tests together; `loop_gain_error` is None without loops.
     """
-    relative = np.concatenate([test.relative(model) for test in data_sets])
-    counts = [test.residual_count for test in data_sets]
+    squares, counts = list[Array](), [test.residual_count for test in data_sets]
+    for test in data_sets:
+        squares.append(np.square(test.relative(model)))
     loops, _ = split_by_kind(data_sets)
     repeats = np.count_nonzero(repeats_of(loops), axis=1)
     return Quality(
-        nrmse=float(np.sqrt(np.mean(relative**2))),
+        nrmse=float(np.sqrt(np.mean(np.concatenate(squares)))),
         reduced_chi_square=reduced_chi_square(model, data_sets, parameters)[0],
         points=sum(counts),
         noise=float(np.sqrt(np.average(np.square([test.relative_noise for test in data_sets]), weights=counts))),

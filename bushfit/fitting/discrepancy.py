@@ -253,22 +253,21 @@ def averaged(processes: Sequence[Discrepancy]) -> Unnamed:
         Correction at the nodes, with its standard deviation, both relative to the stiffness.
     """
     best = max(processes, key=lambda process: process.best[0])
-    processes = [process for process in processes if process.groups == best.groups]
-    gains = np.array([process.best[0] for process in processes])
-    share = np.exp(gains - gains.max())
-    counted = np.flatnonzero(share > _COUNTS).tolist()
-    share = share[counted] / share[counted].sum()
-    freedom = share @ [processes[i].likelihood.freedom(processes[i].best[1]) for i in counted]
+    least = best.best[0] + np.log(_COUNTS)
+    processes = [process for process in processes if process.groups == best.groups and process.best[0] > least]
+    share = np.exp([process.best[0] - best.best[0] for process in processes])
+    share /= share.sum()
+    freedom = share @ [process.likelihood.freedom(process.best[1]) for process in processes]
     wider = float(stdtrit(max(freedom, _MINIMUM_FREEDOM), 0.975)) / Z95
     conditioned = list[tuple[Array, Array]]()
-    for i in counted:
-        conditioned.append(processes[i].conditioned())
+    for process in processes:
+        conditioned.append(process.conditioned())
     means, errors = zip(*conditioned, strict=True)
     mean = share @ np.array(means)
     deviations = np.array([[np.square((one - mean).real), np.square((one - mean).imag)] for one in means])
     error = wider * np.sqrt(np.tensordot(share, np.square(errors) + deviations, 1))
-    lengths = np.exp(share @ np.log([processes[i].lengths for i in counted]))
-    size = wider * float(np.exp(share @ np.log([processes[i].best[1] for i in counted])))
+    lengths = np.exp(share @ np.log(np.array([process.lengths for process in processes])))
+    size = wider * float(np.exp(share @ np.log([process.best[1] for process in processes])))
     patches = []
     for group, nodes in zip(best.groups, best.nodes, strict=True):
         lists = (mean[nodes].real, mean[nodes].imag, *error[:, nodes])

@@ -19,7 +19,7 @@ from bushfit.fitting.prepare_loop import prepare_loop
 from bushfit.fitting.rig_class import class_errors
 from bushfit.geometry import Bushing, Place, unit_strain
 from bushfit.model.model import Model
-from bushfit.model.sensitivity import stiffness_and_slopes
+from bushfit.model.sensitivity import difference_quotients, stepped_values
 from bushfit.reading.measurement import Loop, Source, Sweep
 from bushfit.units import number
 
@@ -191,8 +191,9 @@ def log_slopes(model: Model, data_set: MeasuredTest, names: Sequence[str]) -> Ar
         data_set: test of n operating points.
         names: names of the parameters.
     """
-    points = data_set.direction, data_set.frequency, data_set.amplitude
-    stiffness, slopes = stiffness_and_slopes(model, *points, names, data_set.kind, data_set.conditions)
+    values, steps = stepped_values(model, names, data_set.direction)
+    stack = model.stack(data_set.direction, data_set.kind, data_set.conditions, values)
+    stiffness, slopes = difference_quotients(stack(2.0 * np.pi * data_set.frequency, data_set.amplitude), steps)
     return slopes / stiffness
 
 

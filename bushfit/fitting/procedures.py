@@ -104,9 +104,9 @@ def fit_joint(
         return estimate(replace(problem, model=found.model, tests=with_errors), robust=data.robust)
 
     found, error, notes = with_excess_errors(found, data.bounds, data.campaign.rig, refit)
-    result = _campaign_result(data, [found], [*notes, *unfitted_warnings(found.model, unused)], unused=unused)
+    result = build_result([found], data.bounds, unused=unused)
     return replace(
-        result,
+        _with_campaign(data, [found], result, [*notes, *unfitted_warnings(found.model, unused)]),
         usable=expected_errors(found.model, found.problem.tests, unused, found),
         model_error=error,
         alternatives=alternative_preload_law(found),
@@ -134,9 +134,10 @@ def fit_static(data: PreparedCampaign, springpot: Result | None = None) -> Resul
     fixed = {name: values[name] for name in DYNAMIC if name in values}
     if len(fixed) < len(DYNAMIC):
         found = _fit_without_springpot(data)
-        return _campaign_result(data, [found], [_springpot_warning(data, found)])
+        return _with_campaign(data, [found], build_result([found], data.bounds), [_springpot_warning(data, found)])
     uncertainty = springpot.covariance.restricted(DYNAMIC) if springpot else None
-    return _campaign_result(data, [_fit_step(data, data.static_loops(), fixed)], fixed=uncertainty)
+    found = _fit_step(data, data.static_loops(), fixed)
+    return _with_campaign(data, [found], build_result([found], data.bounds, fixed=uncertainty))
 
 
 def fit_dynamic(data: PreparedCampaign, static: Result) -> Result:
@@ -150,7 +151,8 @@ def fit_dynamic(data: PreparedCampaign, static: Result) -> Result:
     """
     fixed = {name: static.model.values[name] for name in STATIC}
     found = _fit_step(data, [data.smallest_sweep], fixed)
-    return _campaign_result(data, [found], fixed=static.covariance.restricted(STATIC))
+    result = build_result([found], data.bounds, fixed=static.covariance.restricted(STATIC))
+    return _with_campaign(data, [found], result)
 
 
 def given_static(data: PreparedCampaign) -> Result | None:
@@ -185,7 +187,8 @@ def fit_two_step(data: PreparedCampaign) -> TwoStep:
         model, before = dynamic.model, passes[-1] if passes else {}
         passes.append(dict(model.values))
         if all(abs(before.get(name, np.inf) - value) <= _AGREED * abs(value) for name, value in passes[-1].items()):
-            return TwoStep(tuple(passes), _campaign_result(data, [static, dynamic]))
+            steps = [static, dynamic]
+            return TwoStep(tuple(passes), _with_campaign(data, steps, build_result(steps, data.bounds)))
         coordinates = Coordinates.of_parameters(model, DYNAMIC)
         if springpot:
             points.append(coordinates.point(springpot))
@@ -249,24 +252,18 @@ def _fit_step(
     return estimate(data.problem(model, tests, fixed), robust=data.robust, lmfit=True)
 
 
-def _campaign_result(
-    data: PreparedCampaign,
-    steps: Sequence[FitResult],
-    notes: Sequence[Caveat] = (),
-    *,
-    fixed: Covariance | None = None,
-    unused: Sequence[MeasuredTest] = (),
+def _with_campaign(
+    data: PreparedCampaign, steps: Sequence[FitResult], result: Result, notes: Sequence[Caveat] = ()
 ) -> Result:
-    """Build the result of a procedure, with the specimens, the outliers and the warnings on the campaign.
+    """Add the specimens, the outliers and the warnings on the campaign to the result of a procedure.
 
     Args:
         data: prepared campaign.
         steps: fits of the procedure, in order.
+        result: result of these fits.
         notes: warnings to report first.
-        fixed: covariance of parameters that all fits kept fixed; None if these are exact.
-        unused: tests that no fit used, to compare the model with.
     """
-    model, tests = steps[-1].model, [test for step in steps for test in step.data_sets]
+    model, tests = result.model, [test for step in steps for test in step.data_sets]
     outliers = tuple(outlier for step in steps for outlier in step.outliers)
     warnings = [
         *notes,
@@ -282,9 +279,8 @@ def _campaign_result(
         if model.values.keys().isdisjoint(prior.names):
             sentence = f"the prior {prior.source} is not used: the model lacks {', '.join(prior.names)}"
             warnings.append(Caveat("unused_prior", sentence))
-    warnings += outlier_warnings(outliers, robust=data.robust)
-    result = build_result(steps, data.bounds, fixed=fixed, notes=warnings, unused=unused)
-    advised = (replace(note, text=note.text + NEXT) if note.kind in _ADVISED else note for note in result.warnings)
+    warnings += [*outlier_warnings(outliers, robust=data.robust), *result.warnings]
+    advised = (replace(note, text=note.text + NEXT) if note.kind in _ADVISED else note for note in warnings)
     return replace(result, warnings=tuple(advised), outliers=outliers, specimens=data.campaign.specimens)
 
 
@@ -322,7 +318,11 @@ def build_result(
     priors = {name: use for step in steps for name, use in prior_uses(step, cov).items()}
     warnings = [*notes, *prior_warnings(priors)]
     for step in steps:
-        warnings += fit_warnings(last.model, step, bounds, cov)
+        limited, limits = replace(step, problem=replace(step.problem, bounds=bounds)), dict[str, float | None]()
+        for name, end in step.at_bound.items():
+            if bounds.get(name, (None, None))[end == "max"] is None:
+                limits[name] = find_limit(limited, name, "max" if end == "min" else "min")
+        warnings += fit_warnings(last.model, step, limits, cov)
     return Result(
         model,
         tuple(name for name in names if not (bounded_is_fixed and name in at_bound)),
@@ -338,14 +338,16 @@ def build_result(
     )
 
 
-def fit_warnings(model: Model, step: FitResult, bounds: Bounds, covariance: Covariance) -> Iterator[Caveat]:
+def fit_warnings(
+    model: Model, step: FitResult, limits: Mapping[str, float | None], covariance: Covariance
+) -> Iterator[Caveat]:
     """Yield warnings about the tests of a fit, parameters at bounds, parameters not determined, and a misfit.
 
     Args:
         model: fitted model.
         step: result of the fit, one step of a procedure.
-        bounds: limits of parameters that the campaign gives, by name [SI]; for a parameter that ended at another bound,
-            the warning states the one-sided 95 % limit that the tests set.
+        limits: one-sided 95 % limits [SI] of the parameters that ended at a bound of the model, not of the campaign, by
+            name; None for a parameter that the tests do not limit.
         covariance: covariance of the fitted parameters.
     """
     tests, names, at_bound = step.data_sets, step.names, step.at_bound
@@ -365,11 +367,11 @@ def fit_warnings(model: Model, step: FitResult, bounds: Bounds, covariance: Cova
         sentence = f"the fit was stopped after {step.evaluations} evaluations of the model"
         yield Caveat("fit_stopped", f"{sentence}, because chi-square hardly fell: some parameters are undetermined")
     for name, end in at_bound.items():
-        if bounds.get(name, (None, None))[end == "max"] is not None:
+        if name not in limits:
             yield Caveat("given_bound", f"{name} is at the {end} given in [fit]")
             continue
-        shown, limited = "the data do not determine it", replace(step, problem=replace(step.problem, bounds=bounds))
-        if (limit := find_limit(limited, name, "max" if end == "min" else "min")) is not None:
+        shown = "the data do not determine it"
+        if (limit := limits[name]) is not None:
             unit, factor = display_unit(step.model.parameters[name].unit, 1.0, limit)
             how = f"at {'most' if end == 'min' else 'least'} {number(factor * limit, 2)} {unit}".rstrip(" -")
             shown = f"the tests only show that it is {how} (95 %)"
