@@ -257,7 +257,7 @@ def averaged(processes: Sequence[Discrepancy]) -> Unnamed:
     processes = [process for process in processes if process.groups == best.groups and process.best[0] > least]
     share = np.exp([process.best[0] - best.best[0] for process in processes])
     share /= share.sum()
-    freedom = share @ [process.likelihood.freedom(process.best[1]) for process in processes]
+    freedom = float(share @ [process.likelihood.freedom(process.best[1]) for process in processes])
     wider = float(stdtrit(max(freedom, _MINIMUM_FREEDOM), 0.975)) / Z95
     conditioned = list[tuple[Array, Array]]()
     for process in processes:
@@ -266,7 +266,7 @@ def averaged(processes: Sequence[Discrepancy]) -> Unnamed:
     mean = share @ np.array(means)
     deviations = np.array([[np.square((one - mean).real), np.square((one - mean).imag)] for one in means])
     error = wider * np.sqrt(np.tensordot(share, np.square(errors) + deviations, 1))
-    lengths = np.exp(share @ np.log(np.array([process.lengths for process in processes])))
+    lengths = np.exp(share @ np.log([process.lengths for process in processes]))
     size = wider * float(np.exp(share @ np.log([process.best[1] for process in processes])))
     patches = []
     for group, nodes in zip(best.groups, best.nodes, strict=True):
