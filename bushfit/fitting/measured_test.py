@@ -92,7 +92,7 @@ class MeasuredBase(ABC):
     @cached_property
     def model_errors(self) -> SharedErrors:
         """Error of the model of the size `model_error`, as independent errors that each change several residuals."""
-        return self.unit_model_error.scaled(self.model_error)
+        return replace(self.unit_model_error, deviations=self.model_error * self.unit_model_error.deviations)
 
     def weighted(self, weight: Array) -> Self:
         """Return the test with the weight of each of its n points multiplied by a factor, (n,)."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -64,10 +64,6 @@ class SharedErrors:
         directions = np.zeros((change.size, norm.size))
         directions[rows, of_residual] = entries
         return cls(directions, deviation)
-
-    def scaled(self, size: float) -> SharedErrors:
-        """Multiply the errors by a positive factor `size`."""
-        return replace(self, deviations=size * self.deviations)
 
     @property
     def log_det_covariance(self) -> float:
