@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 from itertools import combinations
 
 import numpy as np
+from scipy.linalg import lapack, qr
 from scipy.special import chdtrc
 
 from bushfit.effects.contract import Array
@@ -159,9 +160,8 @@ def _about_smooth_curve(steps: Array, log_stiffness: Array) -> LineNoise:
 
     def of_points(chosen: Array) -> LineNoise:
         """Noise of the points of a mask, (n,), about the curve that is fitted to them by least squares."""
-        span = np.linalg.qr(basis[chosen])[0]
-        scatter = values[chosen] - span @ (span.T @ values[chosen])
-        return LineNoise(scatter, len(scatter) - degree - 1, np.empty((0, 2)))
+        scatter = _project_out(basis[chosen], values[chosen])
+        return LineNoise(scatter, len(scatter), np.empty((0, 2)))
 
     calmer = of_points(np.arange(steps.size) != worst)
     return replace(of_points(inliers), without_largest=calmer if calmer.freedom else None, squared_distances=squared)
@@ -187,6 +187,13 @@ def disturbed_steps(lines: Iterable[LineNoise]) -> list[float]:
 def to_unit_interval(values: Array) -> Array:
     """Scale values, (n,), linearly to the interval from -1 to 1, for Legendre polynomials; all -1 if they are equal."""
     return 2.0 * (values - values.min()) / max(float(np.ptp(values)), np.finfo(float).tiny) - 1.0
+
+
+def _project_out(basis: Array, values: Array) -> Array:
+    """Independent residuals, (n - k, m), of values, (n, m), after a least-squares fit of k functions, (n, k)."""
+    (reflections, factors), _ = qr(basis, mode="raw")
+    turned, *_ = lapack.dormqr("L", "T", reflections, factors, values, lwork=values.shape[1])
+    return np.asarray(turned[basis.shape[1] :])
 
 
 def _gain_and_phase(values: Array) -> Array:
