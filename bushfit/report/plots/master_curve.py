@@ -52,8 +52,8 @@ def master_curve_figure(model: Model, shifted_sweeps: Sequence[ShiftedSweep], ti
         pair.plot(frequency, model.stiffness(place, frequency, level), color=style.INK, lw=1.1, zorder=3)
         for axes in panels:
             style.logarithmic(axes, reach)
-        style.name_levels(panels[-1], [f"{degree:g}" for degree in degrees], "temperature")
+        dots = [panels[-1].plot([], [], "o", color=looks[degree].color, mew=0)[0] for degree in degrees[::-1]]
+        style.legend(panels[-1], dots, [f"{degree:g} °C" for degree in degrees[::-1]], "temperature")
     return figure.explain(
-        f"Line: model at 23 °C, {', '.join(levels)}. Points: measured at the temperatures in the legend [°C], shifted",
-        "to 23 °C by the model.",
+        f"Line: model at 23 °C, {', '.join(levels)}. Points: measured, shifted to 23 °C by the model."
     )
