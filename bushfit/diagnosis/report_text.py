@@ -134,17 +134,15 @@ class DiagnosisWriter:
         """Diagnosis in which a recording mistake explains the gap; the model to use remains the starting model."""
         best, claim, base = first.best, first.best.claim, self.base
         assert claim is not None
-        command, corrections = f"bushfit diagnose CAMPAIGN {claim.options}", "; ".join(claim.corrections)
-        advice = f"if the records of the tests confirm this mistake, correct {corrections} (or {command})"
+        advice = f"if the records of the tests confirm this mistake, correct {'; '.join(claim.corrections)}"
         summary = f"these tests agree if {claim.sentence}"
         if self.finding.verdict == "ambiguous":
             summary += "; correct this first: the tests do not decide yet what else is missing"
         after = with_free_gains(best.state.plain, self.search.data)
         closing = Closing(base, holdout=hold_out(base, after, self.search.data.bounds))
         diagnosis = self._build(closing, summary, self._record_entries(first), places=best, next_test=advice)
-        sentence = f"fitted to the tests as they are, which only agree if {claim.sentence}: {advice}"
-        warnings = (*diagnosis.result.warnings, Caveat("mistaken_record", sentence))
-        result = replace(diagnosis.result, warnings=warnings)
+        warning = Caveat("mistaken_record", f"fitted to the tests as they are, which only agree if {claim.sentence}")
+        result = replace(diagnosis.result, warnings=(*diagnosis.result.warnings, warning))
         return replace(diagnosis, after=after, remainder=find_regions(after), result=result)
 
     def _undecided_diagnosis(self, first: Composition, closing: Closing) -> Diagnosis:
