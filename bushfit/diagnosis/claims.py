@@ -75,11 +75,6 @@ class Claim:
         return labels or (self.mistake.name,)
 
     @property
-    def options(self) -> str:
-        """Options of the command diagnose that correct the mistake."""
-        return " ".join(f"--adopt {label}" for label in self.labels)
-
-    @property
     def sentence(self) -> str:
         """Sentence that states the mistake, with the files of the affected tests, or with their names."""
         files = [file_or_name(test.test) for test in self.affected]

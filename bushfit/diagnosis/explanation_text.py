@@ -32,7 +32,7 @@ def probability_text(composition: Composition, finding: Finding) -> str:
 
 
 def undecided_text(reported: Sequence[Composition]) -> str:
-    """Write a sentence on the reported explanations that the tests cannot distinguish, and on the parts they share."""
+    """Return a sentence on the explanations that the tests cannot distinguish, and on the parts they share."""
     parts = [composition.label.replace("fault: ", "a fault of ").split(" + ") for composition in reported]
     shared = [name for name in parts[0] if all(name in names for names in parts)]
     common = f"all probable explanations contain {' and '.join(shared)}"

@@ -67,7 +67,9 @@ def diagnose(
         except FitError as error:
             thousands = [claim for claim in claims(data, settings.without) if claim.mistake.scales]
             for claim in ClaimScreening(data).best(thousands, 1):
-                error.hint = f"these tests agree if {claim.sentence}: {claim.options} corrects it"
+                error.hint = (
+                    f"these tests agree if {claim.sentence}: --adopt {' --adopt '.join(claim.labels)} corrects it"
+                )
             raise
         known_rows = {(outlier.test, outlier.row) for outlier in excluded}  # a robust fit finds them anew
         candidates = (*outliers, *list_outliers(base.model, split_by_kind(base.data_sets)[1]))

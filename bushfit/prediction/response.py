@@ -254,8 +254,7 @@ def _warnings(result: Result, response: TimeResponse, left_out: list[str], tempe
     short = strokes[strokes < shortest].sum() / max(strokes.sum(), np.finfo(float).tiny)
     if np.mean(strokes < _NOISE * np.ptp(history.value)) > _MOST_NOISE:
         noise, highest = noise_and_highest_frequency(history.value, history.step)
-        is_limited = 2.0 * highest < 0.5 / history.step
-        cutoff = f'"{number(2.0 * highest, 2)} Hz"' if is_limited else "with the highest frequency of the motion"
+        cutoff = f'"{number(2.0 * highest, 2)} Hz"' if 4.0 * highest * history.step < 1.0 else "above all wanted motion"
         sentence = (
             f"most reversals of the displacement are as small as its noise, {number(factor * noise, 2)} "
             f"{unit} rms, and friction follows each of them. To smooth the displacement and keep the motion, "
