@@ -30,6 +30,9 @@ from bushfit.reduction.harmonics import as_complex, basis, least_squares, series
 from bushfit.reduction.turning_points import reversals
 from bushfit.units import number
 
+#: Largest difference of the amplitude of the mean cycle from half the range of the record, relative to that half;
+#: chosen: noise and drift of a steady loop are smaller. Rows that are enough to find the range.
+_UNEQUAL, _ENOUGH_ROWS = 0.15, 100_000
 #: Share of the amplitude, or of half the force's range, above which a mean is reported as a preload; chosen: zero
 #: errors of sensors are smaller.
 TOLD_MEAN = 0.05
@@ -109,7 +112,21 @@ def prepare_loop(loop: Loop, *, without_outliers: bool = False) -> MeasuredLoop:
         preload = float(mean) if abs(mean) - np.hypot(cosine, sine) > _PRELOADED * half_force else None
         unknown = prepared.has_predecessor or abs(found.motion[0]) > 0.01 * float(prepared.amplitude[0])
         prepared = replace(prepared, datum=float(found.force[0].real) if unknown else preload)
-    return replace(prepared, record_notes=(*prepared.record_notes, *_preload_notes(prepared)))
+    notes = [*prepared.record_notes, *_unequal_cycles(prepared), *_preload_notes(prepared)]
+    return replace(prepared, record_notes=tuple(notes))
+
+
+def _unequal_cycles(prepared: MeasuredLoop) -> list[Caveat]:
+    """Warn of a mean cycle whose amplitude differs from half the range of the record: the cycles are unequal."""
+    rows = prepared.test.displacement[:: -(-prepared.test.displacement.size // _ENOUGH_ROWS)]
+    recorded, amplitude = float(np.ptp(np.quantile(rows, (0.01, 0.99)))) / 2.0, float(prepared.amplitude[0])
+    if abs(amplitude / recorded - 1.0) <= _UNEQUAL:
+        return []
+    unit, factor = prepared.test.direction.display.displacement
+    sizes = (
+        f"{number(factor * amplitude, 3)} {unit}, half the range of the record is {number(factor * recorded, 3)} {unit}"
+    )
+    return [Caveat("unequal_cycles", f"the cycles are not equal: their mean has an amplitude of {sizes}")]
 
 
 def _check_loses_energy(prepared: MeasuredLoop) -> None:

@@ -117,7 +117,8 @@ def note_left_out(table: Table, rows: Sequence[FaultyRow], count: int) -> Iterat
 
 def _broken_rows(table: Table, rows: Sequence[FaultyRow]) -> list[tuple[int, int]]:
     """Find rows that are broken over two lines: line numbers of successive lines whose cells together are one row."""
-    filled = [(line, sum(map(is_like_number, map(str, cells)))) for line, cells, fault in rows if fault == "doubtful"]
+    short = [(line, cells) for line, cells, fault in rows if fault == "doubtful" and "" in cells]
+    filled = [(line, sum(map(is_like_number, map(str, cells)))) for line, cells in short]
     pairs = list[tuple[int, int]]()
     for (first, count), (second, rest) in pairwise(filled):
         is_used = bool(pairs) and pairs[-1][1] == first

@@ -123,6 +123,13 @@ def test_a_swept_sine_is_no_loop(paper_model):
         split_record(record)
 
 
+def test_a_mean_of_unequal_cycles_is_said(paper_model):
+    time = np.arange(0.0, 60.0, STEP)
+    narrow = np.sin(2.0 * np.pi * (0.9 * time + 0.1 / 60.0 * time**2))
+    (loop,) = split_record(recorded(paper_model, 1e-3 * narrow))
+    assert any("the cycles are not equal" in note.text for note in prepare_loop(loop).record_notes)
+
+
 @pytest.mark.parametrize("case", ["pauses", "one speed"])
 def test_without_time_parts_are_the_same(paper_model, case):
     motions, expected = PROGRAMMES[case]
