@@ -185,8 +185,12 @@ def test_runs_are_repeats(typed, points, tmp_path, ending, delimiter, header):
 
 def test_what_is_not_understood_is_named(typed, points, tmp_path):
     compounds, points_of_one = (("NR45", 1.0), ("NR60", 1.1)), [*enumerate(points["axial"])]
-    rows = [(*row[:2], row[2] * by, row[3], name, k) for name, by in compounds for k, row in points_of_one]
-    export(tmp_path / "axial.csv", (*HEADERS, "Compound", "Pt"), rows)
+    rows = [
+        (*row[:2], row[2] * by, row[3], name, k, "slow" if row[0] < 80.0 else "fast")
+        for name, by in compounds
+        for k, row in points_of_one
+    ]
+    export(tmp_path / "axial.csv", (*HEADERS, "Compound", "Pt", "Range"), rows)
     said = '"Compound" (column 5) varies from row to row (NR45, NR60) and is not understood'
     done = typed("init", "axial.csv", *GEOMETRY, "-o", "x")
     assert done.stderr.count("is not understood") == done.stderr.count(said) == 1

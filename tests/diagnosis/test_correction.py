@@ -166,6 +166,7 @@ def test_bands_of_a_consistent_campaign_hold_what_the_rig_may_have(measured, pap
     found = asked(measured({"sleeve_compliance": soft}))
     assert found.verdict == "consistent"
     assert any("sleeve_compliance" in each.model.effects for each in found.result.alternatives)
+    assert sum(each.probability for each in found.result.alternatives) <= 1.0
     band = predict(found.result, Direction.RADIAL, FREQUENCIES, AMPLITUDES).stiffness
     sleeve = paper_model.with_effect("sleeve_compliance", {"sleeve_compliance.compliance": soft["compliance"]})
     for truth in (radial(paper_model), radial(sleeve)):
