@@ -12,6 +12,7 @@ from itertools import cycle
 from pathlib import Path
 
 import click
+import numpy as np
 import pandas as pd
 import pytest
 from commandline import Done, typing
@@ -245,6 +246,15 @@ def test_a_prony_series_and_stated_constants(bushfit, tmp_path):
     assert "6.8755E+04" in text  # 1.2 N m/deg in N mm/rad
     assert "the Prony series is valid only from 5 to 155 Hz, error up to" in done.text
     assert "the stated constant, 68.755 N m/rad, loss factor 0.1" in done.text
+    grid = (*grid[:4], "--frequencies", "20 Hz")
+    bushfit("export", "model/model.json", "--format=adams", *options[3:], *grid, "-o", tmp_path / "y")
+    damping = dict(re.findall(r"(T[XY]|FZ)_DAMPING\s*=\s*(\S+)", (tmp_path / "y/bushing_ride.bus").read_text()))
+    bushfit("predict", "model/model.json", *grid, "--no-plots", "-o", tmp_path / "z")
+    point = pd.read_csv(tmp_path / "z/axial.csv").iloc[0]
+    angles = {"TX": 0.1, "TY": 0.1, "FZ": point["loss factor [-]"]}
+    assert {name: float(angle) for name, angle in damping.items()} == pytest.approx(
+        {name: np.degrees(np.arctan(loss)) for name, loss in angles.items()}, rel=1e-4
+    )
 
 
 def test_without_a_grid_it_is_the_measured_one_and_files_say_where_they_hold(root, tmp_path):

@@ -62,6 +62,12 @@ def test_families_of_one_campaign_are_fitted_and_held_out(bushfit, tmp_path):
     assert table["held-out result"][2].endswith("equal within 1 %")
 
 
+def test_without_names_each_law_is_a_family(bushfit, tmp_path, monkeypatch):
+    monkeypatch.setattr("bushfit.diagnosis.families.known_families", lambda *_: ("sliders",))
+    done = bushfit("compare", CAMPAIGN, "-o", tmp_path / "x", "--json", "--no-plots", "--families")
+    assert [family["name"] for family in json.loads(done.stdout)["families"]] == ["paper", "sliders"]
+
+
 def test_predict_lays_measurements_over_takes_grids_and_shows_at_most_eight_amplitudes(bushfit, tmp_path):
     grid = ("--frequencies", "10:30:10 Hz", "--amplitudes", "0.1, 0.3 mm")
     done = bushfit("predict", "model/model.json", "--campaign", CAMPAIGN, "-o", tmp_path / "x", *grid)
