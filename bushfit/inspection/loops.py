@@ -14,7 +14,7 @@ from bushfit.inspection.channels import EVEN_CLOCK, describe_sampling, odd_recor
 from bushfit.inspection.record import Findings, format_frequencies
 from bushfit.reading.measurement import Loop
 from bushfit.reading.names import Labels
-from bushfit.reduction.harmonics import cycle_harmonics, resolved_order, series
+from bushfit.reduction.harmonics import basis, cycle_harmonics, least_squares, resolved_order, series
 from bushfit.reduction.steps import reduce
 from bushfit.reduction.turning_points import noise_threshold
 from bushfit.units import display_unit, format_aligned, number
@@ -62,8 +62,9 @@ def describe_loop(loop: Loop, labels: Labels) -> Findings:
     force, to_force = display_unit(*units.force, half_force)
     half_motion = float(np.ptp(loop.displacement)) / 2.0
     frequency, amplitude = float(prepared.frequency[0]), float(prepared.amplitude[0])
-    whole = slice(int(prepared.measured_force.size * int(prepared.cycles + 0.01) / prepared.cycles))
-    mean_motion, mean_force = prepared.coefficients[0].real, float(prepared.measured_force[whole].mean())
+    # the mean of a Fourier series, whatever part of a cycle the record begins or ends in
+    mean_force = float(least_squares(basis(prepared.phase, 2), prepared.measured_force, prepared.weights)[0])
+    mean_motion = prepared.coefficients[0].real
     noise = f"{number(100 * prepared.noise / half_force, 2)} % of half the {names[1]} range, per row"
     if prepared.noise > half_force:
         noise = "not known: the record is not a steady loop"

@@ -13,6 +13,7 @@ from bushfit.reading.block_labels import is_of_block, label_columns
 from bushfit.reading.headers import WORDS, Vocabulary, plain, split_unit, without_mean
 from bushfit.reading.layout import Layout
 from bushfit.reading.lines import WITH_UNIT, Line, is_comment, is_row, is_summary_row, is_units_row
+from bushfit.reading.measurement import FEWEST_LOOP_ROWS
 from bushfit.reading.names import NO_LABELS, labels_above
 from bushfit.reading.numerals import is_like_number, plainest_value
 from bushfit.reading.roles import PAIRS, is_test
@@ -169,7 +170,8 @@ def exchange_rows(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> 
             table.append([" ".join(f"[{word}]" if units.is_unit(word) else word for word in words), *numbers])
         plain_names = [_LEVEL.sub("", cells[0]) for cells in table]
         roles = vocabulary.roles(plain_names)
-        is_table = ("frequency" in roles and len(roles) > 2) or is_test(roles)
+        is_record = is_test(roles) and len(table[0]) > FEWEST_LOOP_ROWS  # more than a summary of its channels
+        is_table = is_record or ("frequency" in roles and len(roles) > 2)
         is_exchanged |= is_table
         content += [line.content for line in above]
         content += zip_longest(*table, fillvalue="") if is_table else [line.content for line in rows]
