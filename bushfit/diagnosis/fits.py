@@ -62,15 +62,14 @@ def fit_model(model: Model, data_sets: Sequence[MeasuredTest], fixed: Sequence[s
     return Descent.start(FitProblem.with_fixed(model, data_sets, fixed, bounds)).run(EVALUATIONS).solution
 
 
-def fit_rivals(
+def start_rivals(
     models: Mapping[str, Model],
     data_sets: Sequence[MeasuredTest],
     start: Mapping[str, float],
     fixed: Sequence[str],
     bounds: Bounds,
-    columns: Array | None = None,
-) -> dict[str, FitResult]:
-    """Fit several models with proposed effects side by side, and abandon those that fall far behind the best.
+) -> dict[str, Descent]:
+    """Start the fits of several models with proposed effects, for `fit_rivals`.
 
     Args:
         models: models at their starting values, by the name of the effect.
@@ -78,20 +77,34 @@ def fit_rivals(
         start: further starting values, by parameter.
         fixed: names of parameters that are not fitted.
         bounds: limits of parameters inside their general limits.
-        columns: errors that the tests have in common: change of the whitened residuals per standard deviation of each
-            of c errors, (c, n); None without such errors.
 
     Returns:
-        Fits by the name of the effect; fits far behind the best, and effects without a response, are left out.
+        Fits before their first step, by the name of the effect; effects without a response are left out.
     """
     fits = dict[str, Descent]()
-    shared_error = None if columns is None else SharedErrors.from_columns(columns)
     for name, model in models.items():
         model = model.with_values({key: value for key, value in start.items() if key in model.values})
         limits = {**within_reach(model, data_sets), **bounds}  # at the start: the gap has distorted the fit before
         with suppress(FitError, ModelError):  # no response with this effect: no candidate
-            problem = FitProblem.with_fixed(model, data_sets, fixed, limits)
-            fits[name] = Descent.start(replace(problem, shared_error=shared_error))
+            fits[name] = Descent.start(FitProblem.with_fixed(model, data_sets, fixed, limits))
+    return fits
+
+
+def fit_rivals(starts: Mapping[str, Descent], columns: Array | None = None) -> dict[str, FitResult]:
+    """Fit several models with proposed effects side by side, and abandon those that fall far behind the best.
+
+    Args:
+        starts: fits before their first step, by the name of the effect, from `start_rivals`.
+        columns: errors that the tests have in common: change of the whitened residuals per standard deviation of each
+            of c errors, (c, n); None without such errors.
+
+    Returns:
+        Fits by the name of the effect; fits far behind the best are left out.
+    """
+    fits = dict(starts)
+    if columns is not None:
+        error = SharedErrors.from_columns(columns)
+        fits = {name: replace(fit, best=fit.best.with_shared_error(error)) for name, fit in fits.items()}
     running, best = list(fits), 0.0
     for _ in track("evaluations of effects", range(1, EVALUATIONS)):
         for name in running:

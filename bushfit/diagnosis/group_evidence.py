@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import log_ndtr, logsumexp
+from scipy.special import log_ndtr
 
 from bushfit.diagnosis.priors import SIZES
 from bushfit.diagnosis.projected_columns import Batch
@@ -125,11 +125,12 @@ def average(groups: Array, log_evidence: Array, changes: Array) -> list[GroupEvi
         Evidence for each group, in order.
     """
     first = np.flatnonzero(np.diff(groups, prepend=-1))
-    by_block = logsumexp(log_evidence, axis=0) if len(log_evidence) else np.full(log_evidence.shape[1:], -np.inf)
-    by_size = np.logaddexp.reduceat(by_block, first, axis=0)
-    total, count = logsumexp(by_size, axis=1), np.diff(first, append=len(groups)) * SIZES.size
-    share = np.exp(log_evidence - np.repeat(total, np.diff(first, append=len(groups)))[:, None])
-    squares = np.add.reduceat(np.sum(share * changes, axis=(0, 2)), first)
+    blocks = np.diff(first, append=len(groups))
+    highest = np.maximum.reduceat(np.max(log_evidence, axis=(0, 2), initial=-np.inf), first)
+    share = np.exp(log_evidence - np.repeat(highest, blocks)[:, None])
+    by_size = np.add.reduceat(share.sum(axis=0), first, axis=0)
+    total = np.maximum(by_size.sum(axis=1), np.finfo(float).tiny)
+    squares = np.add.reduceat(np.sum(share * changes, axis=(0, 2)), first) / total
     likeliest = SIZES[np.argmax(by_size, axis=1)]
-    values = (total - np.log(count), np.sqrt(squares), likeliest)
+    values = (highest + np.log(total / (blocks * SIZES.size)), np.sqrt(squares), likeliest)
     return [GroupEvidence(*triple) for triple in zip(*(value.tolist() for value in values), strict=True)]

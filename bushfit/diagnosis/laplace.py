@@ -3,7 +3,6 @@
 from math import log
 
 import numpy as np
-from scipy.special import logsumexp
 
 from bushfit.diagnosis.priors import LARGEST, SIZES
 from bushfit.effects import get_effect, qualified_name
@@ -56,7 +55,7 @@ def laplace(name: str, fit: FitResult, before: FitResult) -> tuple[float, dict[s
             error = (1.0 if parameter.log else 1.0 / amount) * np.sqrt(variances[names.index(coordinate)])
             error = max(float(error), _SHARPEST)
             exponent = -0.5 * np.square((times - 1.0) / error)
-            density += float(logsumexp(exponent)) - log(_FINE) - 0.5 * log(2.0 * np.pi) - log(error)
+            density += float(np.logaddexp.reduce(exponent)) - log(_FINE) - 0.5 * log(2.0 * np.pi) - log(error)
             density -= 0.0 if parameter.log else log(amount)
             density -= 0.0 if parameter.neutral == parameter.bounds[0] else log(2.0)
             continue

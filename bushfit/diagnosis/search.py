@@ -20,7 +20,7 @@ import numpy as np
 from bushfit.diagnosis.claims import ClaimScreening, claims
 from bushfit.diagnosis.explanations import Explanation
 from bushfit.diagnosis.faulty_parts import FaultyPart, OutlierCluster
-from bushfit.diagnosis.fits import fit_rivals
+from bushfit.diagnosis.fits import fit_rivals, start_rivals
 from bushfit.diagnosis.group_evidence import GroupEvidence
 from bushfit.diagnosis.hypotheses import Hypothesis, SearchState
 from bushfit.diagnosis.priors import BEAM, DOES_NOT_FIT, LOG_ODDS_CUTOFF, NAMED, ODDS, REFITS, ROUNDS
@@ -94,7 +94,7 @@ class Search:
         tests = RecordedTests.of_fit(self.base, self.data.campaign.rig)
         self.root = SearchState.of_tests(tests)
         self.proposals = proposals(tests.bare, settings.without, self.base.fixed)
-        self._fit_rivals = partial(fit_rivals, fixed=self.base.fixed, bounds=self.data.bounds)
+        self._start_rivals = partial(start_rivals, fixed=self.base.fixed, bounds=self.data.bounds)
         self._log_priors = prior_odds([*self.proposals, *tests.explanations])
         families = {e.family for e in (*self.outlier_clusters, *tests.explanations) if e.kind == "part"}
         self._meeting_odds = log(ODDS["part"] / max(len(families), 1))
@@ -255,10 +255,9 @@ class Search:
             return []
         models = {effect.name: effect.model for effect in effects}
         start = self.start if not state.effects and state.plain.reduced_chi_square > _BENT else {}
-        grown: dict[str, SearchState] = {}
+        grown, starts = dict[str, SearchState](), self._start_rivals(models, state.fit.data_sets, start)
         for deviation in dict.fromkeys((state.likeliest_deviation, 0.0)):
-            columns = state.free_columns(deviation)
-            for name, fit in self._fit_rivals(models, state.fit.data_sets, start, columns=columns).items():
+            for name, fit in fit_rivals(starts, state.free_columns(deviation)).items():
                 log_odds = self._log_odds("effect", name)
                 candidate = self._visit(state.with_fit(fit).with_effect(name, log_odds, state.fit))
                 if name not in grown or candidate.log_posterior > grown[name].log_posterior:
@@ -291,9 +290,9 @@ class Search:
                 change=max(state.change, evidence.size),
             )
             if is_bent:
-                starts = [{}] if state.effects else [{}, self.start]
                 models, tests, columns = {"": grown.fit.model}, grown.fit.data_sets, grown.free_columns(0.0)
-                fits = [fit for s in starts for fit in self._fit_rivals(models, tests, s, columns=columns).values()]
+                starts = [self._start_rivals(models, tests, s) for s in ([{}] if state.effects else [{}, self.start])]
+                fits = [fit for rivals in starts for fit in fit_rivals(rivals, columns).values()]
                 grown = grown.with_fit(min(fits, key=lambda fit: fit.chi_square)) if fits else grown
             yield self._visit(grown)
 
@@ -303,7 +302,7 @@ class Search:
             model = state.fit.model.without(name)
             if state.key - {name} in self._visited or not all(has_used_parameters(e, model) for e in model.records):
                 continue
-            for fit in self._fit_rivals({name: model}, state.fit.data_sets, {}).values():
+            for fit in fit_rivals(self._start_rivals({name: model}, state.fit.data_sets, {})).values():
                 yield self._visit(self._with_fit(state, [e for e in state.effects if e != name], fit))
 
     def _with_fit(self, state: SearchState, effects: Sequence[str], fit: FitResult) -> SearchState:
@@ -336,8 +335,8 @@ class Search:
         near.sort(key=lambda n: -states[n].log_posterior)
         for n in near[:_RIVALS] if leader.likeliest_deviation and not leader.faulty_parts else ():
             state, start = states[n], leader.fit.model.values
-            columns = state.free_columns(leader.likeliest_deviation)
-            for fit in self._fit_rivals({"": state.fit.model}, state.fit.data_sets, start, columns=columns).values():
+            starts = self._start_rivals({"": state.fit.model}, state.fit.data_sets, start)
+            for fit in fit_rivals(starts, state.free_columns(leader.likeliest_deviation)).values():
                 candidate = self._visit(self._with_fit(state, state.effects, fit))
                 states[n] = max(state, candidate, key=lambda rival: rival.log_posterior)
         return states

@@ -187,8 +187,8 @@ def place_suffix(name: str) -> str | None:
     ('radial', None)
     """
     family, _, place = name.partition(".")
-    of_place = name in LIBRARY or name not in library_parameters()
-    return place or None if family in FAMILIES and of_place else None
+    of_place = place and family in FAMILIES and (name in LIBRARY or name not in library_parameters())
+    return place if of_place else None
 
 
 def twins_of(name: str) -> tuple[str, ...]:

@@ -85,23 +85,22 @@ class FitProblem:
             Residuals of the n points and of the p priors of the model, (n + p,), and their derivatives, (k, n + p).
         """
         free, varied = len(self.names), (*self.names, *model.tied)
-        residuals, slopes = list[Array](), list[Array]()
-        for test in self.tests:
-            if (rows := test.recall("rows", model, varied)) is None:
+        of_priors, prior_slopes = prior_rows(model, self.names)
+        count = sum(test.size for test in self.tests)
+        rows = np.zeros((1 + len(varied), count + of_priors.size))
+        for test, block in zip(self.tests, residual_slices(self.tests), strict=True):
+            if (of_test := test.recall("rows", model, varied)) is None:
                 values, steps = stepped_values(model, varied, test.direction)
                 response = test.response(model, values)
                 test.keep("response", model, np.atleast_2d(response)[-1])
                 stepped = test.residual_of(response)
-                rows = test.keep("rows", model, np.vstack(difference_quotients(stepped, steps)), varied)
-            residuals.append(rows[0])
-            slopes.append(rows[1:])
-        jacobian = np.concatenate(slopes, axis=-1)
+                of_test = test.keep("rows", model, np.vstack(difference_quotients(stepped, steps)), varied)
+            rows[:, block] = of_test
+        residual, jacobian = rows[0], rows[1:]
         if model.tied:
             jacobian = jacobian[:free] + model.constraints.slopes(model.values, self.names) @ jacobian[free:]
         jacobian *= self.coordinates.slopes(model.values)[:, None]
-        of_priors, prior_slopes = prior_rows(model, self.names)
-        residual = np.concatenate((*residuals, of_priors))
-        jacobian = np.concatenate((jacobian, prior_slopes), axis=-1)
+        residual[count:], jacobian[:, count:] = of_priors, prior_slopes
         if self.shared_error:
             return self.shared_error.whiten(residual), self.shared_error.whiten(jacobian)
         return residual, jacobian
@@ -241,6 +240,13 @@ class FitResult:
         left_vectors, values, _ = np.linalg.svd(self.jacobian[free].T, full_matrices=False)
         significant = values > ROUNDING * values.max(initial=0.0)
         return float(np.sum(np.square(left_vectors[:, significant].T @ self.residual)))
+
+    def with_shared_error(self, error: SharedErrors) -> FitResult:
+        """Whiten the residuals and their derivatives by an error that the residuals of all tests share."""
+        problem = replace(self.problem, shared_error=error)
+        return replace(
+            self, problem=problem, residual=error.whiten(self.residual), jacobian=error.whiten(self.jacobian)
+        )
 
     def reevaluate(self, model: Model, tests: Sequence[MeasuredTest]) -> FitResult:
         """Compute residuals and Jacobian for other parameter values or other tests, without a fit.

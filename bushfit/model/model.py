@@ -183,12 +183,10 @@ class Model:
         >>> Model.with_defaults(paper.bushing, ["elastic", "viscous"], {"mu": 1e6}).values["viscous.eta"]
         0.0
         """
-        defaults = {
-            qualified_name(effect, parameter): parameter.typical if parameter.neutral is None else parameter.neutral
-            for effect in map(get_effect, effects)
-            for parameter in effect.parameters
+        found = {
+            name: values.get(name, parameter.typical if parameter.neutral is None else parameter.neutral)
+            for name, parameter in structure_of(tuple(effects)).parameters.items()
         }
-        found = {name: values.get(name, default) for name, default in defaults.items()}
         return cls(bushing, tuple(effects), found, unnamed, constraints)
 
     def with_effect(self, name: str, values: Mapping[str, float] | None = None) -> "Model":

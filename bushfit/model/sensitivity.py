@@ -11,7 +11,7 @@ from typing import cast
 import numpy as np
 
 from bushfit.effects import place_suffix
-from bushfit.effects.contract import UNKNOWN, Array, RubberConditions, Value, Values
+from bushfit.effects.contract import UNKNOWN, Array, RubberConditions, Values
 from bushfit.effects.history import History
 from bushfit.geometry import Place, Specimen
 from bushfit.model.model import Kind, Model
@@ -87,16 +87,17 @@ def stepped_values(model: Model, names: Sequence[str], place: Place) -> tuple[Va
         Values by name, numbers or (rows + 1, 1); and the step of each of the k parameters inside its bounds, or 0 for a
         parameter without a row, (k, 1).
     """
-    labels = place.labels if isinstance(place, Specimen) else (str(place),)
-    local = [name for name in names if place_suffix(name) in (None, *labels)]
-    stacked, steps = dict[str, Value](model.values), np.zeros((len(names), 1))
-    for row, name in enumerate(local):
-        parameter, value = model.parameters[name], model.values[name]
-        step = _RELATIVE_STEP * (abs(value) if parameter.log and value else parameter.typical)
-        stacked[name] = column = np.full((len(local) + 1, 1), value)
-        column[row] += step if value + step <= parameter.bounds[1] else -step
-        steps[list(names).index(name)] = column[row] - value
-    return cast(Values, stacked), steps
+    labels = (None, *(place.labels if isinstance(place, Specimen) else (str(place),)))
+    local = [index for index, name in enumerate(names) if place_suffix(name) in labels]
+    parameters = [(model.parameters[names[index]], model.values[names[index]]) for index in local]
+    scales = [abs(value) if parameter.log and value else parameter.typical for parameter, value in parameters]
+    values, step = np.array([value for _, value in parameters]), _RELATIVE_STEP * np.array(scales)
+    step = np.where(values + step <= [parameter.bounds[1] for parameter, _ in parameters], step, -step)
+    columns, steps = np.tile(values, (len(local) + 1, 1)), np.zeros((len(names), 1))
+    columns[:-1] += np.diag(step)
+    steps[local, 0] = np.diag(columns) - values
+    stacked = {names[index]: columns[:, row, None] for row, index in enumerate(local)}
+    return cast(Values, {**model.values, **stacked}), steps
 
 
 def difference_quotients(responses: Array, steps: Array) -> tuple[Array, Array]:

@@ -97,13 +97,18 @@ class Stack:
         Returns:
             Force [N] or moment [N m], (..., k, n).
         """
-        per_sample = {
-            name: value if np.ndim(value) == 0 else np.asarray(value)[..., None] for name, value in self.values.items()
-        }
         setting = replace(self.setting, conditions=self.setting.conditions.select(points).select((..., None)))
-        layers = acting_layers(self.model, setting, per_sample)[: len(self.layers)]
         history = History.steady(motion, cast(float, omega[..., None] / (2.0 * np.pi)))
-        return Stack(self.model, setting, per_sample, layers).force(history)
+        arrays = {name: np.asarray(value)[..., None] for name, value in self.values.items() if np.ndim(value)}
+        if arrays and motion.ndim == 2 and any(layer.adds for layer, _ in self.layers):
+            # the implicit equation of a compliance is solved for the last model, from which all others start
+            self._cycle_stack(setting, {name: value[-1] for name, value in arrays.items()}).force(history)
+        return self._cycle_stack(setting, arrays).force(history)
+
+    def _cycle_stack(self, setting: Setting, arrays: Values) -> Stack:
+        """Stack with some parameter values as arrays over models, operating points and samples."""
+        values = {**self.values, **arrays}
+        return Stack(self.model, setting, values, acting_layers(self.model, setting, values)[: len(self.layers)])
 
     def force(self, displacement: History) -> Array:
         """Compute the force over time.

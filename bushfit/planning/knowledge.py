@@ -9,7 +9,7 @@ import numpy as np
 
 from bushfit.campaign.schema import RigSettings
 from bushfit.campaign.simulated import SimulatedLoop, SimulatedSweep
-from bushfit.diagnosis.fits import fit_model, fit_rivals, result_of
+from bushfit.diagnosis.fits import fit_model, fit_rivals, result_of, start_rivals
 from bushfit.diagnosis.propose import proposals
 from bushfit.diagnosis.record import Diagnosis
 from bushfit.diagnosis.workflow import diagnose
@@ -168,7 +168,7 @@ def _add_effects(plain: FitResult, names: Sequence[str], fixed: Sequence[str], b
         Effects without influence on these tests are omitted.
     """
     models = {proposal.name: proposal.model for proposal in proposals(plain, (), fixed) if proposal.name in names}
-    fits = fit_rivals(models, plain.data_sets, {}, fixed, bounds)
+    fits = fit_rivals(start_rivals(models, plain.data_sets, {}, fixed, bounds))
     for name in names:
         needed = get_effect(name).after
         if name not in fits and needed and needed not in plain.model.effects:
