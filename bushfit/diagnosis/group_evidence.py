@@ -113,7 +113,7 @@ def block_gains(batch: Batch, projections: Array, gram: Array) -> tuple[Array, A
     return gain, np.square(np.abs(amounts @ batch.unit)).max(axis=-1)
 
 
-def average(groups: Array, log_evidence: Array, changes: Array) -> list[GroupEvidence]:
+def average(groups: Array, log_evidence: Array, changes: Array) -> dict[int, GroupEvidence]:
     """Average the evidence of each explanation (group) over sizes of rig errors, its alternatives and amounts.
 
     Args:
@@ -122,7 +122,7 @@ def average(groups: Array, log_evidence: Array, changes: Array) -> list[GroupEvi
         changes: squared relative change of |K|, (cases, blocks, sizes).
 
     Returns:
-        Evidence for each group, in order.
+        Evidence by the index of the group.
     """
     first = np.flatnonzero(np.diff(groups, prepend=-1))
     blocks = np.diff(first, append=len(groups))
@@ -133,4 +133,5 @@ def average(groups: Array, log_evidence: Array, changes: Array) -> list[GroupEvi
     squares = np.add.reduceat(np.sum(share * changes, axis=(0, 2)), first) / total
     likeliest = SIZES[np.argmax(by_size, axis=1)]
     values = (highest + np.log(total / (blocks * SIZES.size)), np.sqrt(squares), likeliest)
-    return [GroupEvidence(*triple) for triple in zip(*(value.tolist() for value in values), strict=True)]
+    triples = zip(*(value.tolist() for value in values), strict=True)
+    return {n: GroupEvidence(*triple) for n, triple in zip(groups[first].tolist(), triples, strict=True)}

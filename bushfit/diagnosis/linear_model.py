@@ -176,10 +176,9 @@ class LinearModel:
             for batch, projections, gram in projection.products(groups):
                 gain, changes = block_gains(batch, projections, gram)
                 log_evidence = projection.base[:, None, None] + gain
-                without, bent = (average(batch.groups, log_evidence[mask], changes[mask]) for mask in (plain, deviates))
-                pairs = zip(without, bent if deviates.any() else [None] * len(without), strict=True)
-                numbers = np.unique(batch.groups).tolist()
-                by_group |= {n: replace(x, with_compound=y) for n, (x, y) in zip(numbers, pairs, strict=True)}
+                alone, bent = (average(batch.groups, log_evidence[mask], changes[mask]) for mask in (plain, deviates))
+                deviating = bent if deviates.any() else dict.fromkeys(alone)
+                by_group |= {n: replace(x, with_compound=deviating[n]) for n, x in alone.items()}
             evidence += [by_group[number] for number in range(len(groups.groups))]
         return evidence
 

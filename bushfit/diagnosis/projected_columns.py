@@ -226,8 +226,6 @@ class GroupSet:
         Returns:
             Products of the q modes of the deviation with the g columns of all groups, (c, q, g).
         """
-        if not len(compound.group.columns):
-            return np.zeros((len(combinations), 0, len(self.rows.rows)))
         keys = [(compound, n) for n in combinations.tolist()]
         if missing := [key for key in keys if key not in self._modes]:
             products = compound.inner(self.rows, np.array([n for _, n in missing]))

@@ -76,8 +76,7 @@ def proposals(fit: FitResult, excluded: Collection[str], fixed: Sequence[str] | 
         shapes, columns = sensitivity(fit.model, fit.data_sets, effect)
         if not shapes:
             continue
-        of_priors = np.zeros((len(columns), fit.residual.size - columns.shape[1]))
-        columns = np.concatenate((columns, of_priors), axis=1)
+        columns = np.pad(columns, ((0, 0), (0, fit.residual.size - columns.shape[1])))  # rows of priors
         gains, amounts, visible = scores(columns, fit.residual, basis)
         amount = effect.amount
         sign = 1 if amount.neutral == amount.bounds[0] else 0

@@ -88,9 +88,7 @@ class FittedTests:
         """Derivatives of ln K at the p points with respect to the k parameter coordinates not at a bound, (k, p)."""
         model, moving = self.solution.model, self.solution.inner_indices
         names = [self.solution.names[i] for i in moving]
-        slopes = list[Array]()
-        for data_set in self.data_sets:
-            slopes.append(log_slopes(model, data_set, names))
+        slopes = [log_slopes(model, data_set, names) for data_set in self.data_sets]
         return np.concatenate(slopes, axis=-1) * self.solution.coordinates.slopes(model.values)[moving, None]
 
     @cached_property

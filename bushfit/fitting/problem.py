@@ -69,10 +69,7 @@ class FitProblem:
 
     def residual(self, model: Model) -> Array:
         """Whitened residuals of the tests, then of the p priors of the model, (n + p,)."""
-        residuals = list[Array]()
-        for test in self.tests:
-            residuals.append(test.residual_of(test.response(model)))
-        rows = np.concatenate((*residuals, prior_rows(model, ())[0]))
+        rows = np.concatenate([*(test.residual(model) for test in self.tests), prior_rows(model, ())[0]])
         return self.shared_error.whiten(rows) if self.shared_error else rows
 
     def linearise(self, model: Model) -> tuple[Array, Array]:
