@@ -202,7 +202,7 @@ def increasing_time(table: Table, column: Column, time: Floats) -> tuple[Floats,
         hint += "bushfit init uses all"
     elif np.all(np.diff(time) >= 0.0):
         hint = "export the file again with more digits of the time"
-    elif time[1:].min() <= time[0] + np.median(steps):
+    elif steps.size and time[1:].min() <= time[0] + np.median(steps):
         hint = 'the time starts again: number the runs in a column "run", or write each run to a file of its own'
     table.refuse(np.append(False, stuck), column, "time does not increase", "a later time in each row", hint)
     if time[-1] - time[0] < LEAST_VALUE:
