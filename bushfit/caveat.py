@@ -76,5 +76,5 @@ def to_entries(warnings: Iterable[Caveat]) -> WarningEntries:
 
 def to_caveats(sentences: Iterable[str], kinds: Iterable[str]) -> list[Caveat]:
     """Convert the warnings of a JSON file, as sentences and kinds; unknown and missing kinds become "other"."""
-    known = (kind if kind in KINDS else "other" for kind in kinds)
-    return [Caveat(kind, sentence) for sentence, kind in zip(sentences, chain(known, repeat("other")), strict=False)]
+    accepted = (kind if kind in KINDS else "other" for kind in kinds)
+    return [Caveat(kind, sentence) for sentence, kind in zip(sentences, chain(accepted, repeat("other")), strict=False)]

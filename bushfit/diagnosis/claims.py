@@ -202,6 +202,9 @@ class ClaimScreening:
         Args:
             candidates: hypotheses of mistakes to compare.
             limit: maximum number of mistakes to select.
+
+        Returns:
+            At most `limit` mistakes, by increasing misfit after correction.
         """
         before, misfits = self.misfit(None), np.array([self.misfit(claim) for claim in candidates])
         changed = np.abs(misfits - before) > _LEAST_CHANGE * before

@@ -211,19 +211,22 @@ def close_gap(search: Search, finding: Finding, hypotheses: Sequence[Hypothesis]
         finding: verdict, with the explanations to report.
         hypotheses: all hypotheses that were compared, the most probable first.
         base: fit of the starting model without the assumed gain errors of loops, see `with_free_gains`.
+
+    Returns:
+        The fit, the smooth correction, and the misfit of held-out tests where the two are compared.
     """
     verdict, reported, data = finding.verdict, finding.reported, search.data
     may_be_wrong = {
         "partly": reported[0].best.levels,
         "ambiguous": any(composition.faulty_parts or composition.best.claim for composition in reported),
     }
-    certain, known = _fit_certain(search, finding, hypotheses)
+    certain, amounts = _fit_certain(search, finding, hypotheses)
     fit, gap = base if certain is search.base else with_free_gains(certain, data), None
     if search.settings.max_effects and verdict not in ("named", "unexplained") and not may_be_wrong.get(verdict):
         rig, has_candidates = data.campaign.rig, verdict == "ambiguous"
         gap = describe(fit, rig, search.start, data.bounds, before=base, has_candidates=has_candidates)
     is_compared = verdict == "named" or (verdict == "ambiguous" and finding.names and not gap)
-    return Closing(fit, known, gap, hold_out(base, fit, data.bounds) if is_compared else None)
+    return Closing(fit, amounts, gap, hold_out(base, fit, data.bounds) if is_compared else None)
 
 
 def _fit_certain(
@@ -248,8 +251,8 @@ def _fit_certain(
     model = base.model
     for name in names:
         model = model.with_effect(name)
-    added, known = mean_parameters(refitted, [name for name in model.values if name not in base.model.values])
-    return fit_model(model.with_values(added), base.data_sets, [*base.fixed, *added], bounds), known
+    added, covariance = mean_parameters(refitted, [name for name in model.values if name not in base.model.values])
+    return fit_model(model.with_values(added), base.data_sets, [*base.fixed, *added], bounds), covariance
 
 
 def with_free_gains(fit: FitResult, data: PreparedCampaign) -> FitResult:

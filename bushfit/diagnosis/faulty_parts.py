@@ -85,6 +85,9 @@ class FaultyPart(Explanation):
 
         Args:
             form: errors of the points; "points" gives one column for each residual of the part's points.
+
+        Returns:
+            Faulty part of the same points, with the errors of this form.
         """
         assert self.group is not None
         group = self.group

@@ -258,7 +258,14 @@ def table_omissions(request: ExportRequest, form: StiffnessForm) -> Iterator[Cav
 
 
 def common_omissions(request: ExportRequest) -> Iterator[Caveat]:
-    """Generate the omissions of every deck: time domain, coupling, and motions that the model lacks."""
+    """Yield what every deck omits.
+
+    Args:
+        request: model and directions to export.
+
+    Yields:
+        Limits of the time domain, of the coupling of directions, and motions that the model lacks.
+    """
     yield NO_LOOPS
     omit = partial(Caveat, "format_omission")
     yield omit("coupling between directions is not included")
@@ -277,7 +284,14 @@ def common_omissions(request: ExportRequest) -> Iterator[Caveat]:
 
 
 def band_omissions(prediction: Prediction) -> Iterator[Caveat]:
-    """Generate the omission of the 95 % band, and on |K| if an unresolved effect belongs to the rig."""
+    """Yield what a deck omits of a prediction.
+
+    Args:
+        prediction: predicted stiffness of one direction.
+
+    Yields:
+        Width of the 95 % band, and the change of |K| if an unresolved effect belongs to the rig.
+    """
     place, band = prediction.direction, prediction.stiffness
     if (width := float(np.max((band.high - band.low) / (2.0 * band.value)))) > 0.0:
         sentence = f"the 95 % band of up to +/-{number(100.0 * width, 2)} % of |K| is left out"

@@ -101,7 +101,14 @@ def prony_series(request: ExportRequest) -> list[PronySeries]:
 
 
 def prony_omissions(series: Sequence[PronySeries]) -> Iterator[Caveat]:
-    """Generate the limits of Prony series: error, frequency band, and strain amplitude of each."""
+    """Yield the limits of Prony series.
+
+    Args:
+        series: Prony series at increasing strain amplitudes.
+
+    Yields:
+        Error and frequency band, strain amplitude of each series, and the approximation of friction.
+    """
     low, high = (number(end, 3) for end in series[0].arms.band)
     worst = number(100.0 * max(one.arms.error for one in series), 2)
     yield Caveat(

@@ -172,6 +172,9 @@ def reduced_chi_square(model: Model, data_sets: Sequence[MeasuredTest], paramete
         model: model to compare.
         data_sets: tests.
         parameters: number of fitted parameters.
+
+    Yields:
+        One warning with the reduced chi-square, and the test that is missed most; none for a model that fits.
     """
     chi_square, freedom = 0.0, -parameters
     for test in data_sets:
@@ -207,6 +210,9 @@ def misfit_warnings(model: Model, data_sets: Sequence[MeasuredTest], parameters:
         model: fitted model.
         data_sets: tests.
         parameters: number of fitted parameters.
+
+    Yields:
+        One warning with the reduced chi-square, and the test that is missed most; none for a model that fits.
     """
     chi_square, freedom = reduced_chi_square(model, data_sets, parameters)
     by_test = {test.name: lack for test in data_sets if (lack := lack_of_fit(model, [test], 0)) is not None}
@@ -329,7 +335,14 @@ def temperature_warning(model: Model, data_sets: Sequence[MeasuredTest]) -> list
 
 
 def mixed_condition_warnings(data_sets: Sequence[MeasuredTest]) -> Iterator[Caveat]:
-    """Yield a warning if tests of one bushing were made on several specimens, and one if under several preloads."""
+    """Yield warnings on tests of one bushing that one model does not describe.
+
+    Args:
+        data_sets: fitted tests.
+
+    Yields:
+        A warning if the tests are of several specimens, and one if they were made under several preloads.
+    """
     labels = {"specimen_number": "of specimens", "preload": "under preloads of"}
     if preload_ranges(data_sets):  # a variable of the model, or without influence
         del labels["preload"]
@@ -346,7 +359,15 @@ def mixed_condition_warnings(data_sets: Sequence[MeasuredTest]) -> Iterator[Cave
 
 
 def unfitted_warnings(model: Model, data_sets: Sequence[MeasuredTest]) -> Iterator[Caveat]:
-    """Yield a warning for each direction with tests, not fitted, that a model misses by more than their noise."""
+    """Yield warnings on tests that were not fitted.
+
+    Args:
+        model: fitted model.
+        data_sets: tests that were not fitted.
+
+    Yields:
+        A warning for each direction in which the model misses tests by more than their noise.
+    """
     misses = dict[str, list[tuple[float, float, str]]]()
     for test in data_sets:
         if (chi_square := lack_of_fit(model, [test], 0)) is not None:

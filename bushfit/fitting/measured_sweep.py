@@ -299,6 +299,9 @@ class MeasuredSweep(MeasuredBase):
     def noise_sensitivity(self, influence: Array) -> dict[Hashable, Array]:
         """Change of k parameter estimates by an error of each estimated noise variance; see `MeasuredLoop`.
 
+        Returns:
+            Changes of the whitened influence by estimated variance.
+
         Notes:
             Within a block the derivatives of V are I with respect to s^2 and 1 1^T with respect to t^2; whitened, W^2
             and (W 1)(W 1)^T. The estimate of t^2 is a mean of `freedom` squares with expectation t^2 + s^2/n; its error

@@ -349,6 +349,9 @@ def fit_warnings(
         limits: one-sided 95 % limits [SI] of the parameters that ended at a bound of the model, not of the campaign, by
             name; None for a parameter that the tests do not limit.
         covariance: covariance of the fitted parameters.
+
+    Yields:
+        Warnings, in the order of the fit; if nothing was fitted, how well the given values agree with the tests.
     """
     tests, names, at_bound = step.data_sets, step.names, step.at_bound
     if unknown := covariance.restricted(names).describe_unknown(model.values):

@@ -112,6 +112,9 @@ def outlier_warnings(outliers: Sequence[Outlier], *, robust: bool) -> Iterator[C
     Args:
         outliers: outliers of all tests.
         robust: True if the fit left the outliers out.
+
+    Yields:
+        A warning for included outliers and one for outliers left out, if there are any.
     """
     for is_excluded, kind, decision in (
         (False, "outliers_included", " and the fit includes them: {}; --loss soft_l1 leaves them out"),

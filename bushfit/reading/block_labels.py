@@ -37,7 +37,14 @@ _HOLDING = {**dict.fromkeys(CONDITIONS, ""), "direction": "not stated", "part": 
 
 
 def find_lines_above(table: Table) -> list[Line]:
-    """Find the non-empty lines above a table, and the notes below it; a footnote is behind the header it refers to."""
+    """Find the lines that belong to a table without being part of it.
+
+    Args:
+        table: table of a file.
+
+    Returns:
+        Non-empty lines above the table, and notes below it; a footnote stands behind the header it refers to.
+    """
     layout, last = table.layout, table.layout.lines_before_data
     not_above = (layout.header_line, layout.units_line)
     lines = [line for line in table.source.head() if line.number <= last and line.number not in not_above]
@@ -52,7 +59,14 @@ def find_lines_above(table: Table) -> list[Line]:
 
 
 def find_remarks(table: Table) -> tuple[Caveat, ...]:
-    """Warn of lines above a table, marked rows and hidden rows that may change what the test means."""
+    """Warn of remarks in a file that may change what the test means.
+
+    Args:
+        table: table of the file.
+
+    Returns:
+        Warnings on lines above the table, marked rows and hidden rows.
+    """
     remarks = ((line.number, line.text[:_LONGEST_QUOTE]) for line in table.lines_above if is_remark(line.text))
     warnings = [Caveat("remark", f'line {number} is not understood: "{text}"') for number, text in remarks]
     rows = [] if all(is_like_number(str(cell)) for cell in table.first_row) else table.first_rows

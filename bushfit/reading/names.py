@@ -222,6 +222,12 @@ def labels_above(lines: Iterable[Line]) -> Labels:
     """Extract the labels of a test from lines above its table, such as "Temperature: 23 degC".
 
     Unknown names and quantities without a unit are ignored.
+
+    Args:
+        lines: lines above the table.
+
+    Returns:
+        Labels that all lines together state.
     """
     lines = list(lines)
     conventions = {found for line in lines if (found := _convention_in_line(line))}
