@@ -100,7 +100,7 @@ def respond(truth: Truth, amplitude: float, random: np.random.Generator, times: 
     return time_response(result, Direction.AXIAL, history), truth.force(history)
 
 
-@pytest.mark.parametrize("seeds", [2, pytest.param(SEEDS, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("seeds", [1, pytest.param(SEEDS, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name", TRUTHS)
 def test_five_times_the_tested_amplitude_is_in_the_band_or_has_a_warning(name, seeds):
     inside, warned, errors = [], [], []
