@@ -119,9 +119,11 @@ def loop_harmonics(loop: Loop, frequency: float, cycles: float, *, from_rest: bo
     transient = (1.0 if cycles >= 2.0 else np.inf) if from_rest else 0.0
     settled = int(np.searchsorted(phase, transient)) if phase[-1] >= transient else 0
     solution, inliers, outliers = np.empty((columns.shape[1], 2)), np.zeros(values.shape, dtype=bool), {}
+    both = least_squares(columns, values)
     for i, (name, column) in enumerate(recorded.items()):
         used = slice(settled if name == "force" else 0, None)
-        solution[:, i], inliers[used, i] = _fit_without_outliers(columns[used], values[used, i])
+        start = both[:, i] if used.start == 0 else least_squares(columns[used], values[used, i])
+        solution[:, i], inliers[used, i] = _fit_without_outliers(columns[used], values[used, i], start)
         outliers[name] = _NO_OUTLIERS
         if column.size <= _MOST_ROWS_CHECKED or not inliers[used, i].all():
             residual = (values[:, i] - columns @ solution[:, i])[used]
@@ -204,7 +206,7 @@ def outlier_distance(solution: Array, residual: Array, rows: int) -> float:
     return outlier_limit(rows, 1, np.inf) * (MEDIAN_TO_SIGMA * float(np.median(np.abs(residual)))) + corner
 
 
-def _fit_without_outliers(columns: Array, values: Array) -> tuple[Array, Array]:
+def _fit_without_outliers(columns: Array, values: Array, solution: Array) -> tuple[Array, Array]:
     """Fit harmonics to a displacement or force without its outliers.
 
     Least squares may follow a cluster of outliers. Rows are therefore first weighted down by their distance; then
@@ -213,11 +215,12 @@ def _fit_without_outliers(columns: Array, values: Array) -> tuple[Array, Array]:
     Args:
         columns: basis of mean, cosines and sines at the rows, (n, 2 order + 1).
         values: displacement or force of the rows, (n,).
+        solution: harmonics by least squares over all rows, (2 order + 1,).
 
     Returns:
         Harmonics, (2 order + 1,), and the mask of the rows that are no outliers, (n,).
     """
-    solution, inliers, stuck = least_squares(columns, values), np.ones(values.size, dtype=bool), are_stuck(values)
+    inliers, stuck = np.ones(values.size, dtype=bool), are_stuck(values)
     if _inliers(columns, values, solution, stuck).all():
         return solution, inliers
     for _ in range(10):  # of weighting down; chosen
