@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from bushfit.campaign.bodies import specimens_of
-from bushfit.campaign.copies import without_copied_repeats, without_copied_tests
+from bushfit.campaign.copies import without_copied_loops, without_copied_points
 from bushfit.campaign.quantities import Compound, EffectsSettings, ReportSettings, embed_logo
 from bushfit.campaign.schema import CampaignFile, FitSettings, ParameterSetting, PredictSettings, RigSettings
 from bushfit.campaign.simulated import SimulateSettings
@@ -120,14 +120,11 @@ def load_campaign(path: str | Path) -> Campaign:
         "bushing": bushing,
         "specimens": specimens,
         "loops": tuple(
-            without_copied_tests(
+            without_copied_loops(
                 [loop for keywords in loops for loop in split_record(read_loop(**keywords), keywords["test"])]
             )
         ),
-        "sweeps": tuple(
-            without_copied_repeats(sweep)
-            for sweep in without_copied_tests([read_sweep(**keywords) for keywords in sweeps])
-        ),
+        "sweeps": tuple(without_copied_points([read_sweep(**keywords) for keywords in sweeps])),
         "validation": tuple(prepare_record(read_loop(**keywords), keywords["test"].lowpass) for keywords in records),
         "sha256": hashlib.sha256(path.read_bytes()).hexdigest(),
         "logo": logo,

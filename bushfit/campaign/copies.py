@@ -1,12 +1,11 @@
-"""Leave out copies: tests that a campaign lists under two names, and repeats that were copied within a file."""
+"""Leave out copies: tests that a campaign lists under two names, and points that several tests or repeats share."""
 
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bushfit.caveat import Caveat
 from bushfit.reading.measurement import Loop, Source, Sweep
@@ -19,89 +18,109 @@ _DIGITS = 9
 _Test = TypeVar("_Test", Loop, Sweep)
 
 
-def group_copies(tests: Sequence[_Test]) -> list[list[_Test]]:
-    """Group tests with identical data in the same direction or of the same specimen.
-
-    Two measurements never agree in all digits; sweeps of fewer than five points may, and are never grouped.
-
-    Args:
-        tests: loops, or sweeps, in order.
-
-    Returns:
-        Groups in the order of their first test; a test without copies is a group by itself.
-    """
-    groups: defaultdict[object, list[_Test]] = defaultdict(list)
-    for number, test in enumerate(tests):
-        if isinstance(test, Loop):
-            numbers: bytes | int = np.stack((test.time, test.displacement, test.force)).tobytes()
-        else:
-            numbers = _fingerprint(test) if test.frequency.size >= _FEWEST_POINTS else number
-        groups[test.direction, numbers].append(test)
+def group_copies(loops: Sequence[Loop]) -> list[list[Loop]]:
+    """Group loops with identical data in the same direction or of the same specimen, in order of their first loop."""
+    groups: defaultdict[object, list[Loop]] = defaultdict(list)
+    for loop in loops:
+        groups[loop.direction, np.stack((loop.time, loop.displacement, loop.force)).tobytes()].append(loop)
     return list(groups.values())
 
 
-def without_copied_tests(tests: Sequence[_Test]) -> list[_Test]:
-    """Leave out tests that are copies of an earlier test. A copy contains no further information.
+def copied_points(sweeps: Sequence[Sweep]) -> dict[tuple[int, int], list[int]]:
+    """Find the runs of sweeps that are copies: one other run of the sweep, or one other sweep, has all their points.
+
+    Two measurements never agree in all digits; fewer than five points of a file may, and are no copies. Of several
+    identical runs, the first is the original.
 
     Args:
-        tests: loops, or sweeps, of a campaign in its order.
+        sweeps: sweeps in order; only those in the same direction or of the same specimen are compared.
 
     Returns:
-        The remaining tests, each with a note that names its copies.
+        Indices of the copied rows of a sweep, by the indices of this sweep and of the sweep with the original rows.
     """
-    remaining = []
-    for first, *copies in group_copies(tests):
-        files = [copy.source.file.name if copy.source else copy.name for copy in copies]
-        note = Caveat("copied_tests", f"{_join_names(files)} with the same data: used once") if files else None
-        remaining.append(_with_note(first, note) if note else first)
+    runs: dict[tuple[int, Any], list[int]] = {}
+    runs_at: defaultdict[object, set[tuple[int, Any]]] = defaultdict(set)
+    points = [[(sweep.direction, *point) for point in _rounded_points(sweep)] for sweep in sweeps]
+    for index, sweep in enumerate(sweeps):
+        for row, level in enumerate(zip(sweep.repeat.tolist(), sweep.held_value.tolist(), strict=True)):
+            run = (index, level if sweep.stepped else None)
+            runs.setdefault(run, []).append(row)
+            runs_at[points[index][row]].add(run)
+    copies: defaultdict[tuple[int, int], list[int]] = defaultdict(list)
+    for run, rows in reversed(runs.items()):
+        index = run[0]
+        equal_runs = (runs_at[points[index][row]] - {run} for row in rows)
+        # a run of this sweep, or another sweep
+        originals = [{other if other[0] == index else (other[0], None) for other in equal} for equal in equal_runs]
+        for original in sorted(number for number, _ in set.intersection(*originals))[:1]:
+            copies[index, original] += rows
+            for row in rows:
+                runs_at[points[index][row]].discard(run)
+    files = [sweep.source.file if sweep.source else sweep.name for sweep in sweeps]
+    counts = Counter[object]()
+    for (index, _), rows in copies.items():
+        counts[files[index]] += len(rows)
+    return {pair: rows for pair, rows in sorted(copies.items()) if counts[files[pair[0]]] >= _FEWEST_POINTS}
+
+
+def without_copied_loops(loops: Sequence[Loop]) -> list[Loop]:
+    """Leave out the loops of a campaign that are copies of an earlier loop; a note on that loop names its copies."""
+    return [_with_note(first, _used_once(first, copies)) for first, *copies in group_copies(loops)]
+
+
+def without_copied_points(sweeps: Sequence[Sweep]) -> list[Sweep]:
+    """Leave out the runs of sweeps that are copies of another run. A copy contains no further information.
+
+    Args:
+        sweeps: sweeps of a campaign in its order.
+
+    Returns:
+        The remaining sweeps of the remaining rows, with notes on the copies.
+    """
+    copies, remaining = copied_points(sweeps), []
+    is_copy = [np.zeros(sweep.frequency.size, dtype=bool) for sweep in sweeps]
+    for (index, _), rows in copies.items():
+        is_copy[index][rows] = True
+    for index, sweep in enumerate(sweeps):
+        if is_copy[index].all():
+            continue
+        notes = [_used_once(sweep, [sweeps[copy] for copy, first in copies if first == index and is_copy[copy].all()])]
+        for (_, original), rows in ((pair, rows) for pair, rows in copies.items() if pair[0] == index):
+            repeats = [*map(str, sorted(set(sweep.repeat[rows].tolist())))]
+            of_repeats = f" of repeat{'s' * (len(repeats) > 1)} {_join_names(repeats)}" if original == index else ""
+            source = "an earlier repeat" if original == index else sweeps[original].name
+            sentence = f"{len(rows)} points{of_repeats} are exact copies of {source} and are left out; "
+            sentence += "row numbers in messages do not count the copies"
+            notes.append(Caveat("copied_repeats", sentence))
+        names = ("frequency", "amplitude", "stiffness", "repeat", "reached", "relative_error", "temperature")
+        columns = {name: getattr(sweep, name) for name in names}
+        columns = {name: column[~is_copy[index]] for name, column in columns.items() if isinstance(column, np.ndarray)}
+        sweep = replace(sweep, **columns) if is_copy[index].any() else sweep
+        for note in notes:
+            sweep = _with_note(sweep, note)
+        remaining.append(sweep)
     return remaining
 
 
-def without_copied_repeats(sweep: Sweep) -> Sweep:
-    """Leave out runs of a sweep that are copies of an earlier run.
-
-    Args:
-        sweep: sweep of a campaign.
-
-    Returns:
-        Sweep of the remaining rows, with a note on the copied repeats; the same sweep if it has no copies.
-    """
-    runs: set[bytes] = set()
-    is_copy, repeats = np.zeros(sweep.frequency.size, dtype=bool), dict[int, None]()
-    for repeat, level in sorted(set(zip(sweep.repeat.tolist(), sweep.held_value.tolist(), strict=True))):
-        rows = (sweep.repeat == repeat) & (sweep.held_value == level)
-        numbers = _fingerprint(sweep, rows)
-        if numbers in runs:
-            is_copy |= rows
-            repeats[repeat] = None
-        runs.add(numbers)
-    points = int(np.count_nonzero(is_copy))
-    if sweep.stepped is None or points < _FEWEST_POINTS:
-        return sweep
-    names = ("frequency", "amplitude", "stiffness", "repeat", "reached", "relative_error", "temperature")
-    columns = {name: getattr(sweep, name) for name in names}
-    columns = {name: values[~is_copy] for name, values in columns.items() if isinstance(values, np.ndarray)}
-    note = Caveat(
-        "copied_repeats",
-        f"{points} points of repeat{'s' * (len(repeats) > 1)} {_join_names([*map(str, repeats)])} are exact copies of "
-        "an earlier repeat and are left out; row numbers in messages do not count the copies",
-    )
-    return _with_note(replace(sweep, **columns), note)
-
-
-def _fingerprint(sweep: Sweep, rows: NDArray[np.bool_] | slice = slice(None)) -> bytes:
-    """Bytes of frequency, amplitude and stiffness of sweep rows, rounded and sorted; equal data have equal bytes."""
-    stiffness = sweep.stiffness[rows]
-    numbers = np.stack([sweep.frequency[rows], sweep.amplitude_reached[rows], stiffness.real, stiffness.imag])
+def _rounded_points(sweep: Sweep) -> list[list[float]]:
+    """Frequency, amplitude and complex stiffness of each row of a sweep, rounded; equal data have equal numbers."""
+    stiffness = sweep.stiffness
+    numbers = np.stack([sweep.frequency, sweep.amplitude_reached, stiffness.real, stiffness.imag], axis=1)
     scale = 10.0 ** (_DIGITS - 1 - np.floor(np.log10(np.maximum(np.abs(numbers), 1e-300))))
-    numbers = np.round(numbers * scale) / scale
-    return numbers[:, np.lexsort(numbers[::-1])].tobytes()
+    return (np.round(numbers * scale) / scale).tolist()
 
 
-def _with_note(test: _Test, note: Caveat) -> _Test:
-    """Add a warning to the notes on how the file of a test was read."""
+def _used_once(first: _Test, copies: Sequence[_Test]) -> Caveat | None:
+    """Note on the copies of a test, with the names of their files; of one file, the names of the tests."""
+    file = first.source.file if first.source else None
+    names = [copy.source.file.name if copy.source and copy.source.file != file else copy.name for copy in copies]
+    return Caveat("copied_tests", f"{_join_names(names)} with the same data: used once") if names else None
+
+
+def _with_note(test: _Test, note: Caveat | None) -> _Test:
+    """Add a warning, if any, to the notes on how the file of a test was read."""
     source: Source | None = test.source
-    return replace(test, source=source and source.with_note(note))
+    return replace(test, source=source.with_note(note)) if source and note else test
 
 
 def _join_names(names: Sequence[str]) -> str:

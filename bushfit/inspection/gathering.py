@@ -5,13 +5,14 @@ from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from itertools import permutations
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from bushfit.campaign.campaign import TEST_FILES
-from bushfit.campaign.copies import group_copies
+from bushfit.campaign.copies import copied_points, group_copies
 from bushfit.caveat import Caveat
 from bushfit.errors import BushfitError, NoColumnError, NoTestError, ResonanceTestError, printable
 from bushfit.fitting.measured_loop import MeasuredLoop
@@ -300,12 +301,14 @@ def with_contradictions(files: Sequence[Inspection]) -> list[Inspection]:
     sweeps = [inspection.measured for inspection in files if isinstance(inspection.measured, Sweep)]
     names = {id(inspection.measured): str(inspection.file.parent / inspection.label) for inspection in files}
     oddities: defaultdict[int, list[Caveat]] = defaultdict(list)
-    groups: list[list[Loop] | list[Sweep]] = [*group_copies(loops), *group_copies(sweeps)]
-    for copies in groups:
-        for test in copies if len(copies) > 1 else ():
-            same_data = " and ".join(names[id(copy)] for copy in copies if copy is not test)
-            sentence = f"the same data are in {same_data}: a campaign uses these data once"
-            oddities[id(test)].append(Caveat("same_data", sentence))
+    copied = defaultdict[int, list[str]](list)
+    pairs = [(copy, test) for copies in group_copies(loops) for copy, test in permutations(copies, 2)]
+    shared = [(sweeps[copy], sweeps[original]) for copy, original in copied_points(sweeps) if copy != original]
+    for test, copy in (*pairs, *shared, *(pair[::-1] for pair in shared)):
+        copied[id(test)].append(names[id(copy)])
+    for test_id, sources in copied.items():
+        sentence = f"the same data are in {' and '.join(sources)}: a campaign uses these data once"
+        oddities[test_id].append(Caveat("same_data", sentence))
     placed = [inspection for inspection in files if inspection.direction is not None and inspection.kind != "history"]
     for part in dict.fromkeys(inspection.part for inspection in placed):
         tests = [inspection.measured for inspection in placed if inspection.part == part]

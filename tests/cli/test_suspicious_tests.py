@@ -30,6 +30,9 @@ def test_copies_count_once(bushfit, own, once, command):
     (own / LOOP).with_name("linked.csv").symlink_to(own / LOOP)
     for name in ("again", "linked"):
         text += f'\n[[loops]]\nfile = "../data/cmp_15961/{name}.csv"\ndirection = "axial"\n'
+    part = sweep[sweep["amplitude [mm]"] == sweep["amplitude [mm]"].min()]
+    part.to_csv((own / SWEEP).with_name("level.csv"), index=False)
+    text += '\n[[sweeps]]\nfile = "../data/cmp_15961/level.csv"\ndirection = "axial"\n'
     once.write_text(text, encoding="utf-8")
     done = bushfit(command, once, "-o", own / "copied", "--no-plots")
     assert "loop_axial_1: again.csv and linked.csv with the same data: used once" in done.stderr
