@@ -52,7 +52,7 @@ _MULTIPLE = re.compile(
     r"(?:[x×*]\s*)?(?:(?:10(?:\^|\*\*)|1?[eE])(?P<power>[+-]?\d{1,2})|1/(?P<part>10+)|(?<=[x×* ])(?P<factor>\d+\.?\d*))"
     r"(?![\d.])\s*[*·]?(?P<unit>.*)"
 )
-_SUPERSCRIPTS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
+SUPERSCRIPTS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
 #: Full-width signs of Chinese and Japanese texts as plain ones.
 FULL_WIDTH = {code: code - 0xFEE0 for code in range(0xFF01, 0xFF5F)}
 #: Maximum length of a unit [characters]; pint is slow with longer texts.
@@ -304,7 +304,7 @@ def common_unit(unit: str) -> tuple[str, str]:
 def _resolve(text: str) -> tuple[float, str]:
     """Factor to SI, and SI base unit, of a unit; the base unit of an angle is the radian."""
     text = text.translate(FULL_WIDTH).strip().rstrip(".")
-    text = re.sub("(?<=10)[⁻⁰¹²³⁴-⁹]+", lambda power: "^" + power[0].translate(_SUPERSCRIPTS), text)
+    text = re.sub("(?<=10)[⁻⁰¹²³⁴-⁹]+", lambda power: "^" + power[0].translate(SUPERSCRIPTS), text)
     if match := _MULTIPLE.fullmatch(text):
         scale, base = _resolve(match["unit"])
         return scale * float(match["factor"] or f"1e{match['power'] or 1 - len(match['part'])}"), base

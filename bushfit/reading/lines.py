@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from bushfit import units
 from bushfit.reading.headers import WORDS, plain, split_convention
-from bushfit.reading.numerals import is_like_number
+from bushfit.reading.numerals import EXPONENT, is_like_number
 
 #: First words of rows that summarise others.
 _SUMMARIES = frozenset(map(plain, WORDS["rows_of"]["summary"]))
@@ -21,7 +21,7 @@ _COMMENT_SIGNS = ("#", "%", "//")
 _BETWEEN_QUANTITIES = re.compile(r"(?<=[^\d\s])\s+|\s+(?=[+-]?\.?\d)")
 #: Number with a unit: "594.4 N/mm", "±0,5mm", "5.7°". Possessive: an exponent belongs to the number, never to the unit.
 WITH_UNIT = re.compile(
-    r"(?:±|\+/?-)?\s*(?P<number>[+-]?[\d.,]++(?:\s*+[eEdD][+-]?\d++)?+)\s*+(?P<unit>(?:[^\W\d]|[°%‰])[^;]{0,20})"
+    rf"(?:±|\+/?-)?\s*(?P<number>[+-]?[\d.,]++(?:\s*+{EXPONENT})?+)\s*+(?P<unit>(?:[^\W\d]|[°%‰])[^;]{{0,20}})"
 )
 
 #: A line of a text, or the cells of a row of a workbook: texts and numbers.

@@ -14,6 +14,8 @@ from functools import cached_property, lru_cache
 from itertools import islice, product
 from typing import TYPE_CHECKING, NamedTuple
 
+from bushfit.units import SUPERSCRIPTS
+
 if TYPE_CHECKING:
     from bushfit.reading.table import Table
 
@@ -29,8 +31,14 @@ _SIGN = "[+\\-\u2212]"
 _SEPARATORS = {",": ",", ".": r"\.", " ": f"[{BLANKS}]", "'": f"[{APOSTROPHES}]"}
 #: Largest number of characters of a number; chosen: the largest float written out has 309 digits.
 _LONGEST_NUMBER = 400
+#: Superscript digits and minus sign.
+_RAISED = f"[{''.join(map(chr, SUPERSCRIPTS))}]"
+#: Factor of a power of ten before its exponent: "x10^2", "·10²".
+_TIMES_TEN = rf"[{BLANKS}]?[x×*·⋅][{BLANKS}]?10(?:\^|\*\*|(?={_RAISED}))"
+#: Exponent behind a number; Fortran writes 1.0D-03.
+EXPONENT = rf"(?:(?:[eEdD]|{_TIMES_TEN})(?:{_SIGN}?\d+|{_RAISED}+))"
 #: Text with the characters of a number, in an order that numbers may have.
-_LIKE_NUMBER = re.compile(rf"{_SIGN}?[.,]?\d[\d.,{BLANKS}{APOSTROPHES}]*(?:[eEdD]{_SIGN}?\d+)?", re.ASCII)
+_LIKE_NUMBER = re.compile(rf"{_SIGN}?[.,]?\d[\d.,{BLANKS}{APOSTROPHES}]*{EXPONENT}?", re.ASCII)
 #: Number whose point or comma may be the thousands separator or the decimal mark: 1.234.
 _ONE_GROUP = re.compile(rf"{_SIGN}?[1-9]\d{{0,2}}([.,])\d{{3}}", re.ASCII)
 #: Number without thousands separators: 1234.5.
@@ -48,7 +56,7 @@ class Numerals:
     def _pattern(self) -> re.Pattern[str]:
         """Regular expression of a number in this notation."""
         mark = re.escape(self.decimal)
-        forms = [rf"(?:\d+(?:{mark}\d*)?|{mark}\d+)(?:[eEdD]{_SIGN}?\d+)?"]  # Fortran writes 1.0D-03
+        forms = [rf"(?:\d+(?:{mark}\d*)?|{mark}\d+){EXPONENT}?"]
         if self.thousands:
             forms.append(rf"[1-9]\d{{0,2}}(?:{_SEPARATORS[self.thousands]}\d{{3}})+(?:{mark}\d*)?")
         return re.compile(rf"{_SIGN}?(?:{'|'.join(forms)})", re.ASCII)
@@ -63,6 +71,8 @@ class Numerals:
             return None
         if self.thousands:
             text = re.sub(_SEPARATORS[self.thousands], "", text)
+        if "^" in text or "*" in text or not text.isascii():
+            text = re.sub(_TIMES_TEN, "e", text).translate(SUPERSCRIPTS)
         return float(text.replace(self.decimal, ".").replace("\u2212", "-").lower().replace("d", "e"))
 
 

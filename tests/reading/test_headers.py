@@ -99,6 +99,8 @@ UNCLEAR: dict[str, tuple[str, dict[str, str], float | None]] = {
     "settled by both marks": ("1.234,5;1.234;2.345", {}, 2345.0),
     "settled by an exponent": ("1.234;1.234e3;2.345", {}, 2.345),
     "settled by an exponent of Fortran": ("1.234;1.234D+03;2.345", {}, 2.345),
+    "a power of ten": ("1.234;1.234;2.345 x 10^-2", {}, 0.02345),
+    "a power of ten in superscript": ("1.234;1.234;2.345·10⁻²", {}, 0.02345),
     "settled by a group too many": ("1.234.567;1.234;2.345", {}, 2345.0),
 }
 
