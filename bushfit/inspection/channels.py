@@ -1,6 +1,6 @@
 """Recorded channels of a loop or a raw history: sampling, and faults such as gaps, clipped values and outliers."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -61,13 +61,17 @@ class RecordedChannel(NamedTuple):
 
 
 def odd_recording(
-    record: Loop, labels: Labels, frequencies: Sequence[float], amplitudes: Sequence[float], stiffness: Sequence[float]
+    record: Loop,
+    labels: Mapping[str, Labels],
+    frequencies: Sequence[float],
+    amplitudes: Sequence[float],
+    stiffness: Sequence[float],
 ) -> list[Caveat]:
     """Find oddities of a record: labels that contradict it, implausible sizes, and faults of its channels.
 
     Args:
         record: record of a loop, of several loops or of a raw history [SI].
-        labels: labels in the names of its file and sheet.
+        labels: stated quantities by their origin, as in `wrong_labels`.
         frequencies: frequencies of its motion [Hz].
         amplitudes: zero-to-peak amplitudes of its motion [m, rad or strain], (n,).
         stiffness: magnitudes of the stiffness at these amplitudes [N/m, N m/rad or Pa], (n,).

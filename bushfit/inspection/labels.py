@@ -1,7 +1,9 @@
 """Labels of a test in names and in the lines above its table: values for keys of a campaign, and contradictions."""
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -9,20 +11,25 @@ import numpy as np
 
 from bushfit.caveat import Caveat
 from bushfit.geometry import Place
-from bushfit.reading.headers import ZERO_TO_PEAK, AmplitudeConvention
+from bushfit.reading.headers import ZERO_TO_PEAK, AmplitudeConvention, plain
+from bushfit.reading.layout import UNIT_NAMES
 from bushfit.reading.levels import read_condition
+from bushfit.reading.measurement import Floats
 from bushfit.reading.names import Labels, StatedQuantity, labels_in_names
 from bushfit.reading.si_columns import columns_key
 from bushfit.reading.stiffness import hint_for_convertible_columns
 from bushfit.reading.table import Table
-from bushfit.units import parse_quantity
+from bushfit.reading.times import sampling_rate_above
+from bushfit.units import is_compatible, is_unit, parse_quantity, si_factor
 
 #: Conditions of a test that a campaign states, with their names in sentences.
 _CONDITIONS = {key: key for key in ("temperature", "preload", "date", "operator")} | {"specimen_number": "specimen"}
 #: Role of the quantity that a sweep keeps constant, by the campaign key that states its value.
 _CONSTANT_ROLES = {"at_amplitude": "amplitude", "at_frequency": "frequency"}
 
-#: Relative difference up to which a measured value agrees with the name of the file; chosen: rigs miss levels by it.
+#: Word or unit in a line of text; and a unit after the word "in", as in "Force in kN".
+_WORD, _IN_UNIT = re.compile(r"[^\s,;:|=()\[\]{}]+"), re.compile(r"\w in \w", re.IGNORECASE)
+#: Relative difference up to which a measured value agrees with a label; chosen: rigs miss levels by it.
 _AGREEMENT = 0.03
 
 
@@ -157,12 +164,16 @@ def _constant_quantity(
 
 
 def wrong_labels(
-    labels: Labels, direction: Place, amplitudes: Sequence[float], frequencies: Sequence[float], sampling: float = 0.0
+    labels: Mapping[str, Labels],
+    direction: Place,
+    amplitudes: Sequence[float],
+    frequencies: Sequence[float],
+    sampling: float = 0.0,
 ) -> Iterator[Caveat]:
-    """Warn where the name of a file states an amplitude or a frequency that the file does not contain.
+    """Warn where a name or a line above the table states an amplitude or a frequency that the file does not contain.
 
     Args:
-        labels: quantities stated in the names of file and sheet.
+        labels: stated quantities by their origin, "name" (of file and sheet) or "text above the table".
         direction: direction or specimen.
         amplitudes: zero-to-peak amplitudes in the file [m, rad or strain].
         frequencies: frequencies in the file [Hz].
@@ -176,8 +187,8 @@ def wrong_labels(
         ("amplitude", direction.motion.displacement_unit, amplitudes, factor, f"{unit} zero-to-peak"),
         ("frequency", "Hz", frequencies, 1.0, "Hz"),
     )
-    for name, expected, values, to_display, written in quantities:
-        labelled = labels.of_dimension(expected)
+    for origin, (name, expected, values, to_display, written) in product(labels, quantities):
+        labelled = labels[origin].of_dimension(expected)
         factors = [ZERO_TO_PEAK[label.convention or "zero-to-peak"] for label in labelled]
         sizes = [factor * parse_quantity(label.text, expected) for label, factor in zip(labelled, factors, strict=True)]
         expected_values = [*values, sampling] if sampling and expected == "Hz" else values
@@ -185,9 +196,35 @@ def wrong_labels(
         if not labelled or np.any(np.abs(ratios - 1.0) <= _AGREEMENT):
             continue
         is_double = name == "amplitude" and np.any(np.abs(ratios - 2.0) <= 2.0 * _AGREEMENT)
-        in_name = dict.fromkeys(f"{label.text} {label.convention or ''}".rstrip() for label in labelled)
+        stated = dict.fromkeys(f"{label.text} {label.convention or ''}".rstrip() for label in labelled)
         in_file = list(dict.fromkeys(f"{to_display * value:.4g}" for value in values))
         in_file = in_file if len(in_file) <= 4 else [f"{in_file[0]} to {in_file[-1]}"]
-        doubt = ": the name may be peak-to-peak" if is_double else ""
-        sentence = f"the name states {' or '.join(in_name)}, the {name} is {', '.join(in_file)} {written}{doubt}"
+        doubt = f": the {origin} may be peak-to-peak" if is_double else ""
+        sentence = f"the {origin} states {' or '.join(stated)}, the {name} is {', '.join(in_file)} {written}{doubt}"
+        yield Caveat("wrong_label", sentence)
+
+
+def contradicting_lines(table: Table, time: Floats | None) -> Iterator[Caveat]:
+    """Warn where a line above the table states another unit than a header, or another rate than the recorded time.
+
+    Args:
+        table: table of the test.
+        time: recorded time [s], (n,); None for a sweep, or if the file has no time.
+    """
+    for line in table.lines_above:
+        words = [word for word in _WORD.findall(line.text) if word != "in"]
+        stated = [word for word in words if is_unit(word)]
+        is_list_of_units = any(plain(word) in UNIT_NAMES for word in words) or _IN_UNIT.search(line.text)
+        for column in table.roles.values() if is_list_of_units and not re.search(r"\d", line.text) else ():
+            unit = column.unit or ""
+            scales = [si_factor(word, unit) for word in stated if unit and is_compatible(word, unit)]
+            if scales and si_factor(unit, unit) not in scales:
+                sentence = f'line {line.number} states "{line.text}", the unit of "{column.header}" is {unit}'
+                yield Caveat("wrong_label", sentence)
+    rate = sampling_rate_above(table)[0]
+    recorded = 0.0 if time is None else 1.0 / float(np.median(np.diff(time)))
+    if rate and recorded and abs(rate / recorded - 1.0) > _AGREEMENT:
+        sentence = (
+            f"the text above the table states a sampling rate of {rate:.4g} Hz, the rows are {recorded:.4g} a second"
+        )
         yield Caveat("wrong_label", sentence)

@@ -1,6 +1,6 @@
 """Contents of a hysteresis loop, several loops in one record, or a raw stepped-sine history: sizes, noise, oddities."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -44,12 +44,12 @@ _FEWEST_RIPPLE_ROWS = 200
 _LONGEST_CYCLE = 3000.0
 
 
-def describe_loop(loop: Loop, labels: Labels) -> Findings:
+def describe_loop(loop: Loop, labels: Mapping[str, Labels]) -> Findings:
     """Facts and oddities of a loop.
 
     Args:
         loop: loop [SI].
-        labels: labels in the names of its file and sheet.
+        labels: stated quantities by their origin, as in `wrong_labels`.
 
     Returns:
         Facts by name, and a sentence on each oddity.
@@ -113,12 +113,12 @@ def describe_loop(loop: Loop, labels: Labels) -> Findings:
     return facts, odd
 
 
-def describe_history(history: Loop, labels: Labels, needed: Sequence[float] = ()) -> Findings:
+def describe_history(history: Loop, labels: Mapping[str, Labels], needed: Sequence[float] = ()) -> Findings:
     """Facts and oddities of a raw stepped-sine history.
 
     Args:
         history: record of the raw history [SI].
-        labels: labels in the names of its file and sheet.
+        labels: stated quantities by their origin, as in `wrong_labels`.
         needed: frequencies [Hz] of cycles that take much of the record.
 
     Returns:
@@ -147,13 +147,13 @@ def describe_history(history: Loop, labels: Labels, needed: Sequence[float] = ()
     return facts, [*notes, *odd, *reduction.warnings]
 
 
-def describe_programme(record: Loop, loops: Sequence[Loop], labels: Labels) -> Findings:
+def describe_programme(record: Loop, loops: Sequence[Loop], labels: Mapping[str, Labels]) -> Findings:
     """Facts and oddities of a record that contains several loops.
 
     Args:
         record: the whole record [SI].
         loops: loops of the record, in order.
-        labels: labels in the names of its file and sheet.
+        labels: stated quantities by their origin, as in `wrong_labels`.
 
     Returns:
         Facts by name, and a sentence on each oddity.

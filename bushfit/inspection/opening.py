@@ -13,7 +13,7 @@ from bushfit.campaign.campaign import reader_keywords
 from bushfit.caveat import Caveat
 from bushfit.errors import BushfitError, MeasurementError, error_location
 from bushfit.geometry import Direction, Place, Specimen
-from bushfit.inspection.labels import count_temperatures, keys_from_labels, labels_of_file
+from bushfit.inspection.labels import contradicting_lines, count_temperatures, keys_from_labels, labels_of_file
 from bushfit.inspection.loops import describe_history, describe_loop, describe_programme
 from bushfit.inspection.recognition import recognize_table, test_direction, tested_body
 from bushfit.inspection.record import ColumnDescription, Findings, Inspection, Kind
@@ -64,6 +64,7 @@ def inspect_file(file: Path, test_options: Mapping[str, Any], of_book: Labels = 
     entry = campaign_entry(table, place, test_options, is_sweep=is_sweep)
     by_name = labels_of_file(file, table.source.sheet or "", test_options)
     label_keys, label_facts, counted = keys_from_labels(table, read_as, entry, by_name, of_book, is_sweep=is_sweep)
+    labels = {"name": by_name, "text above the table": table.labels_above}
     if "at_amplitude" in label_keys:
         entry.pop("amplitude", None)  # counted already
     entry |= label_keys
@@ -71,7 +72,7 @@ def inspect_file(file: Path, test_options: Mapping[str, Any], of_book: Labels = 
     measured: Loop | Sweep
     if is_sweep:
         measured = read_sweep(**reader_arguments(table, read_as, entry, SweepFile))
-        facts, odd = describe_sweep(measured, by_name)
+        facts, odd = describe_sweep(measured, labels)
         if amplitude := table.roles.get("amplitude"):
             counted = amplitude.convention is not None
             if "peak-to-peak" in (amplitude.convention, entry.get("amplitude")):
@@ -79,7 +80,7 @@ def inspect_file(file: Path, test_options: Mapping[str, Any], of_book: Labels = 
     else:
         measured, entry, turned = read_either_sign(table, read_as, entry)
         settings = reader_arguments(table, read_as, entry, LoopFile)["test"]
-        kind, (facts, odd) = classify_recording(measured, by_name, settings)
+        kind, (facts, odd) = classify_recording(measured, labels, settings)
         odd = turned + odd
         if preload := facts.get("preload"):
             if "preload" in label_keys and is_contradicted(entry["preload"], measured):
@@ -87,6 +88,8 @@ def inspect_file(file: Path, test_options: Mapping[str, Any], of_book: Labels = 
                 sentence = f"the preload {stated} that the text states is not in the record: {preload}"
                 odd.append(Caveat("wrong_preload", sentence))
             entry.setdefault("preload", preload)
+    time = measured.time if isinstance(measured, Loop) and measured.has_recorded_time else None
+    odd += contradicting_lines(table, time)
     contents = describe_format(table), describe_columns(table, is_sweep=is_sweep), facts | label_facts, tuple(odd)
     is_uncounted = is_sweep and not counted and "amplitude" not in entry
     return Inspection(file, kind, place, *contents, entry, measured, amplitude_convention_unknown=is_uncounted)
@@ -200,12 +203,12 @@ def is_contradicted(text: str, loop: Loop) -> bool:
     return abs(abs(preload.value) - abs(float(channel.mean()))) > _FAR_FROM_MEAN * float(np.ptp(channel))
 
 
-def classify_recording(measured: Loop, by_name: Labels, test: LoopFile) -> tuple[Kind, Findings]:
+def classify_recording(measured: Loop, labels: Mapping[str, Labels], test: LoopFile) -> tuple[Kind, Findings]:
     """Determine whether a recording is a loop, a programme of several loops, or a raw stepped-sine history.
 
     Args:
         measured: recording in SI.
-        by_name: labels in the names of its file and sheet.
+        labels: stated quantities by their origin, as in `wrong_labels`.
         test: table of the recording in a campaign.
 
     Returns:
@@ -218,11 +221,11 @@ def classify_recording(measured: Loop, by_name: Labels, test: LoopFile) -> tuple
     if len(points) > 1 and is_fast:
         with suppress(MeasurementError):  # no steady sine after all
             slow = [frequency for frequency, _ in steps if 2.0 / frequency > _SLOW_SHARE * np.ptp(measured.time)]
-            return "history", describe_history(measured, by_name, slow)
+            return "history", describe_history(measured, labels, slow)
     loops = split_record(measured, test)
     if len(loops) > 1:
-        return "loop", describe_programme(measured, loops, by_name)
-    facts, odd = describe_loop(loops[0], by_name)
+        return "loop", describe_programme(measured, loops, labels)
+    facts, odd = describe_loop(loops[0], labels)
     if is_fast or len(points) > 1:
         description = f"at {fastest:.3g} Hz" if is_fast else "of several amplitudes"
         sentence = f"a motion {description} is read as a loop; if it is a stepped sine, run bushfit reduce"

@@ -1,6 +1,6 @@
 """Contents of a sweep: frequencies, amplitudes, repeats, noise and oddities."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 import pandas as pd
@@ -47,12 +47,12 @@ _SMALLEST_STEP = 0.02
 _MOST_LISTED, _MOST_LEVELS = 4, 8
 
 
-def describe_sweep(sweep: Sweep, labels: Labels) -> Findings:
+def describe_sweep(sweep: Sweep, labels: Mapping[str, Labels]) -> Findings:
     """Facts and oddities of a sweep.
 
     Args:
         sweep: sweep [SI].
-        labels: labels in the names of its file and sheet.
+        labels: stated quantities by their origin, as in `wrong_labels`.
 
     Returns:
         Facts by name, and a sentence on each oddity.

@@ -38,8 +38,8 @@ _LONGEST_HEADER = 10_000
 #: Non-empty lines below a header that are searched for its units row and first numbers; chosen: room for comments.
 _LINES_BELOW_HEADER = 8
 #: Names in the first cells of rows that describe the columns, such as "Unit" and "dx"; and of rows of units among them.
-_UNIT_ROWS = frozenset(map(plain, WORDS["rows_of"]["units"]))
-_DESCRIPTIONS = _UNIT_ROWS | frozenset(map(plain, WORDS["rows_of"]["descriptions"]))
+UNIT_NAMES = frozenset(map(plain, WORDS["rows_of"]["units"]))
+_DESCRIPTIONS = UNIT_NAMES | frozenset(map(plain, WORDS["rows_of"]["descriptions"]))
 #: Letter, which each name of a column has.
 _LETTER = re.compile(r"[^\W\d_]")
 #: A number with a number sign: "#1".
@@ -336,7 +336,7 @@ def _layout(
 
 def _is_labelled_units_row(cells: Sequence[str], width: int) -> bool:
     """True if a row of at most `width` cells begins with a word such as "Unit", and half of the others are units."""
-    return 1 < len(cells) <= width and plain(cells[0]) in _UNIT_ROWS and is_units_row(cells[1:])
+    return 1 < len(cells) <= width and plain(cells[0]) in UNIT_NAMES and is_units_row(cells[1:])
 
 
 def _below_headers(header: str, row: str) -> list[str]:

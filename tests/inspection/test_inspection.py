@@ -37,10 +37,10 @@ def plan(**settings: float) -> SimulateSettings:
     return SimulateSettings(repeats=3, loops=LOOPS, sweeps=(SWEEP,), **settings)
 
 
-def look(folder: Path, test: Loop | Sweep, name: str = "axial.csv") -> Inspection:
-    """Inspect a test that is written to a file."""
+def look(folder: Path, test: Loop | Sweep, name: str = "axial.csv", above: str = "") -> Inspection:
+    """Inspect a test that is written to a file, below the lines `above`."""
     table = raw_sweep_table(test) if isinstance(test, Sweep) else raw_loop_table(test)
-    (folder / name).write_bytes(to_csv(table))
+    (folder / name).write_bytes(above.encode() + to_csv(table))
     return inspect_file(folder / name, {})
 
 
@@ -194,19 +194,23 @@ def test_each_fault_of_a_sweep_is_told(sweep, tmp_path, said):
 
 
 @pytest.mark.parametrize(
-    ("name", "said"),
+    ("name", "above", "said"),
     [
-        ("loop_axial_1mm_0.1Hz.csv", ()),
-        ("axial_18mm_bushing_1,0 mm 10mm_min.csv", ()),
-        ("loop_axial_2mm.csv", ("the name states 2 mm, the amplitude is 1 mm zero-to-peak: the name may be p",)),
+        ("loop_axial_1mm_0.1Hz.csv", "Amplitude: 1 mm\nUnits: s, mm, N\n", ()),
+        ("axial_18mm_bushing_1,0 mm 10mm_min.csv", "", ()),
+        ("axial.csv", "Frequency: 0.2 Hz\n", ("the text above the table states 0.2 Hz, the frequency",)),
+        ("axial.csv", "Units: s, mm, kN\n", ('line 1 states "Units: s, mm, kN", the unit of "force [N]" is N',)),
+        ("axial.csv", "Sampling rate: 512 Hz\n", ("the text above the table states 512 rows a second, the rec",)),
+        ("loop_axial_2mm.csv", "", ("the name states 2 mm, the amplitude is 1 mm zero-to-peak: the name may be p",)),
         (
             "loop_axial_0p5mm_0.2Hz.csv",
+            "",
             ("the name states 0.5 mm, the amplitude", "the name states 0.2 Hz, the frequency"),
         ),
     ],
 )
-def test_labels_are_held_against_the_content(loop, tmp_path, name, said):
-    odd = [*map(str, look(tmp_path, loop, name).odd)]
+def test_labels_are_held_against_the_content(loop, tmp_path, name, above, said):
+    odd = [*map(str, look(tmp_path, loop, name, above).odd)]
     assert len(odd) == len(said)
     assert all(sentence.startswith(start) for sentence, start in zip(odd, said, strict=True))
 
