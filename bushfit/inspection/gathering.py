@@ -14,7 +14,7 @@ import numpy as np
 from bushfit.campaign.campaign import TEST_FILES
 from bushfit.campaign.copies import copied_points, group_copies
 from bushfit.caveat import Caveat
-from bushfit.errors import BushfitError, NoColumnError, NoTestError, ResonanceTestError, printable
+from bushfit.errors import BushfitError, MeasurementError, NoColumnError, NoTestError, ResonanceTestError, printable
 from bushfit.fitting.measured_loop import MeasuredLoop
 from bushfit.fitting.measured_sweep import MeasuredSweep
 from bushfit.fitting.preparation import prepare_loops, prepare_sweeps
@@ -33,6 +33,7 @@ from bushfit.reading.names import NO_LABELS, Labels, labels_above, labels_in_nam
 from bushfit.reading.parts import open_file
 from bushfit.reading.roles import CONDITIONS
 from bushfit.reading.table import Table
+from bushfit.units import is_unit
 
 #: Role of the column that a file lacks, by the key of a campaign that states it.
 _INSTEAD_OF_COLUMN = {
@@ -259,7 +260,40 @@ def distribute_options(sources: Sequence[TestSource], test_options: Mapping[str,
         for index, number in numbers.items():
             if number == 0 and max(numbers.values()) > (0 if column else 1):
                 by_source[index][name] = None
+        if name in ("at_amplitude", "at_frequency"):
+            of_option = [sources[index] for index in recognized if by_source[index][name]]
+            check_one_level(of_option, name, str(test_options[name]))
     return [replace(source, test_options=keys) for source, keys in zip(sources, by_source, strict=True)]
+
+
+def check_one_level(sources: Sequence[TestSource], key: str, stated: str) -> None:
+    """Check that the names of tests allow one amplitude or frequency for all of them.
+
+    Args:
+        sources: tests to which the option applies.
+        key: "at_amplitude" or "at_frequency".
+        stated: the option, such as "0.1 mm"; its unit completes a name without one, such as "A=0.5".
+
+    Raises:
+        MeasurementError: the names state different amplitudes or frequencies.
+    """
+    unit = stated.lstrip("+-.,0123456789eE ")
+    levels = dict[str, str]()
+    for source in sources:
+        names = [name for name in (source.sheet, source.file.stem) if name]
+        marked = [one for one in labels_in_names(*(f"{name} {unit}" for name in names)).quantities if one.is_marked]
+        labels = labels_in_names(*names) | Labels(tuple(marked))
+        if is_unit(unit) and len(found := labels.of_dimension(unit)) == 1:
+            levels[str(source)] = found[0].text
+    if len(set(levels.values())) > 1:
+        option = f"--{key.replace('_', '-')}"
+        raise MeasurementError(
+            f"{option} applies to all these tests, and their names state different values",
+            found=f"{option} {stated}; " + ", ".join(f"{level} in {name}" for name, level in levels.items()),
+            expected="one value for all tests, or no such option",
+            hint=f"leave {option} out and write the value with its unit into each name, or state {key} for each test "
+            "in the campaign",
+        )
 
 
 def needs_option(file: Path, key: str, role: str, test_options: Mapping[str, Any]) -> bool | None:

@@ -224,7 +224,5 @@ def contradicting_lines(table: Table, time: Floats | None) -> Iterator[Caveat]:
     rate = sampling_rate_above(table)[0]
     recorded = 0.0 if time is None else 1.0 / float(np.median(np.diff(time)))
     if rate and recorded and abs(rate / recorded - 1.0) > _AGREEMENT:
-        sentence = (
-            f"the text above the table states a sampling rate of {rate:.4g} Hz, the rows are {recorded:.4g} a second"
-        )
+        sentence = f"the text above the table states {rate:.4g} rows a second, the recorded time {recorded:.4g}"
         yield Caveat("wrong_label", sentence)

@@ -200,7 +200,7 @@ def test_each_fault_of_a_sweep_is_told(sweep, tmp_path, said):
         ("axial_18mm_bushing_1,0 mm 10mm_min.csv", "", ()),
         ("axial.csv", "Frequency: 0.2 Hz\n", ("the text above the table states 0.2 Hz, the frequency",)),
         ("axial.csv", "Units: s, mm, kN\n", ('line 1 states "Units: s, mm, kN", the unit of "force [N]" is N',)),
-        ("axial.csv", "Sampling rate: 512 Hz\n", ("the text above the table states 512 rows a second, the rec",)),
+        ("axial.csv", "Sampling rate: 512 Hz\n", ("the text above the table states 512 rows",)),
         ("loop_axial_2mm.csv", "", ("the name states 2 mm, the amplitude is 1 mm zero-to-peak: the name may be p",)),
         (
             "loop_axial_0p5mm_0.2Hz.csv",
