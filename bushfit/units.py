@@ -55,6 +55,8 @@ _MULTIPLE = re.compile(
 SUPERSCRIPTS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
 #: Full-width signs of Chinese and Japanese texts as plain ones.
 FULL_WIDTH = {code: code - 0xFEE0 for code in range(0xFF01, 0xFF5F)}
+#: First character of a sign in UTF-8 that was decoded as Windows-1252: "Âµm", "Â°", "Ns/mmÂ²".
+_MOJIBAKE = re.compile("Â(?=[µ°·²³])")
 #: Maximum length of a unit [characters]; pint is slow with longer texts.
 _LONGEST_UNIT = 40
 #: Unit by spelling: in lower case, with capitals, and spellings of an acceleration and of a length.
@@ -303,7 +305,7 @@ def common_unit(unit: str) -> tuple[str, str]:
 @lru_cache(maxsize=256)
 def _resolve(text: str) -> tuple[float, str]:
     """Factor to SI, and SI base unit, of a unit; the base unit of an angle is the radian."""
-    text = text.translate(FULL_WIDTH).strip().rstrip(".")
+    text = _MOJIBAKE.sub("", text.translate(FULL_WIDTH)).replace("Î¼", "µ").strip().rstrip(".")
     text = re.sub("(?<=10)[⁻⁰¹²³⁴-⁹]+", lambda power: "^" + power[0].translate(SUPERSCRIPTS), text)
     if match := _MULTIPLE.fullmatch(text):
         scale, base = _resolve(match["unit"])

@@ -207,6 +207,8 @@ def check_stiffness(
         )
     low, high = _LOSS_FACTORS
     likelier = {"phase": "rad" if column.unit != "rad" else "deg", "loss_factor": "%"}.get(pair[1])
+    if likelier == "rad" and np.abs(values["phase"]).max() > 2.0 * np.pi * column.scale:
+        likelier = None
     other_unit = f', perhaps units = {{ {pair[1]} = "{likelier}" }} in the campaign' if likelier else ""
     table.refuse(
         ~((loss_factor >= low) & (loss_factor <= high)),

@@ -19,16 +19,20 @@ from typing import NamedTuple
 from bushfit import units
 from bushfit.caveat import Caveat
 from bushfit.errors import MeasurementError
+from bushfit.geometry import Direction
 from bushfit.reading.blocks import find_segments
 from bushfit.reading.headers import COUNTED, AmplitudeConvention, Vocabulary, split_convention
 from bushfit.reading.layout import Layout
 from bushfit.reading.lines import Line, is_comment, is_row, is_summary_row, is_units_row
+from bushfit.reading.names import named_direction
 from bushfit.reading.numerals import is_like_number, plainest_value
 from bushfit.reading.roles import CONDITIONS
 from bushfit.reading.source import RowSource, Sheet, cells_of
 
 #: Roles of the two stepped quantities: one varies down the rows and the other across the columns.
 _STEPPED = ("frequency", "amplitude")
+#: Words of the longest title of a block, such as "Radial, part 2"; chosen: more are a remark.
+_LONGEST_TITLE = 4
 #: Largest number of header rows above a block; chosen: a title, levels, quantities, and units.
 _MOST_HEADER_ROWS = 4
 #: Number in a header, with its symbol ("A = 0.1") and the word after it, which may be its unit.
@@ -120,7 +124,7 @@ def unpivot(source: RowSource, layout: Layout, file: Path, vocabulary: Vocabular
     cells = [(line.number, cells_of(line, mark)) for line in source.head() if not is_comment(line.content, mark)]
     width = max((len(row) for _, row in cells), default=0)
     lines = [Line(number, [*row, *[""] * (width - len(row))]) for number, row in cells]
-    columns, texts = list[_WideColumn](), list[str]()
+    columns, texts, directions = list[_WideColumn](), list[str](), dict[Direction, None]()
     for above, rows in find_segments(lines, first_number, fewest_rows=2):
         headers = [list(map(str, line.content)) for line in above[-_MOST_HEADER_ROWS:]]
         if not (rows and headers):
@@ -135,8 +139,19 @@ def unpivot(source: RowSource, layout: Layout, file: Path, vocabulary: Vocabular
             data = [Line(row.number, row.content[side]) for row in rows]
             columns += _read_block([row[side] for row in headers], data, vocabulary)
         texts += [text for row in headers for text in row]
+        titles = [line.text for line in above if len(line.text.split()) <= _LONGEST_TITLE]
+        directions |= dict.fromkeys(direction for title in titles if (direction := named_direction([title])))
     if not columns:
         return None
+    if len(directions) > 1:
+        raise MeasurementError(
+            "the titles of the tables name several directions",
+            file=file,
+            place=f'sheet "{source.sheet}"' if source.sheet else None,
+            found=" and ".join(directions),
+            expected="tables of one direction",
+            hint="write the tables of each direction into a sheet or file of their own",
+        )
     sheet, long_layout = _long_table(columns, source, file, vocabulary)
     summaries = dict.fromkeys(text for text in texts if is_summary_row([text]))
     notes = tuple(
