@@ -92,6 +92,33 @@ def test_a_hint_leads_to_what_a_sweep_lacks(typed, tmp_path, header, said, unsai
     assert unsaid not in done.stderr.partition("try:")[2]
 
 
+WIDE_TABLE = (
+    "f [Hz],K* 0.1 mm [N/mm],K* 0.2 mm [N/mm],tan d 0.1 mm,tan d 0.2 mm\n5,600,550,0.1,0.11\n9,610,560,0.1,0.11\n"
+)
+LONG_TABLE = "f [Hz],K* [N/mm],tan d\n5,600,0.1\n9,610,0.1\n15,620,0.1\n"
+
+
+@pytest.mark.parametrize(
+    ("texts", "options", "message"),
+    [
+        (
+            {"axial_A0.1.csv": LONG_TABLE, "axial_A0.5.csv": LONG_TABLE.replace("0,0", "1,0")},
+            ["--at-amplitude", "0.1 mm"],
+            "their names state different values",
+        ),
+        (
+            {"bushing.csv": f"Axial\n{WIDE_TABLE}\nRadial\n{WIDE_TABLE}"},
+            ["--direction", "axial"],
+            "the titles of the tables name several directions",
+        ),
+    ],
+)
+def test_an_option_that_the_files_contradict_is_an_error(typed, tmp_path, texts, options, message):
+    for name, text in texts.items():
+        (tmp_path / name).write_text(text)
+    assert message in typed("inspect", *texts, "--no-plots", *options, status=2).stderr
+
+
 def test_a_column_is_named_where_it_stands_and_the_text_holds_in_any_folder(typed, tmp_path, root):
     files = sweeps(tmp_path, *(f"f [Hz],{level} [mm],stiffness [N/mm],eta" for level in ("Pegel SS", "amplitude")))
     done = typed("inspect", *files, "--no-plots", "--column", "amplitude=Pegel SS [mm]")
