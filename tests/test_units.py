@@ -29,11 +29,11 @@ def test_units_that_people_read(value, unit, shown):
 @pytest.mark.parametrize(
     ("text", "expected", "value"),
     [
-        ("18mm", "m", 0.018), ("-1e2 µm", "m", -1e-4), ("3 Âµm", "m", 3e-6), ("2 °", "rad", math.radians(2)), ("0.5 %", "1", 0.005),
+        ("18mm", "m", 0.018), ("-1e2 µm", "m", -1e-4), ("2 °", "rad", math.radians(2)), ("0.5 %", "1", 0.005),
         ("60 1/min", "Hz", 1.0), ("10 mm/min", "m/s", 1e-2 / 60), ("3 kNmm", "N*m", 3.0), ("1 kN·mm⁻¹", "N/m", 1e6),
         ("1 N mm^-1", "N/m", 1e3), ("1 Nm/deg", "N*m/rad", math.degrees(1)), ("1 N/mm2", "Pa", 1e6),
         ("1 kp/mm", "N/m", 9806.65), ("1 kgf/cm2", "Pa", 98066.5), ("1 Ncm", "N*m", 1e-2), ("2 Inch", "m", 0.0508),
-        ("2 mils", "m", 5.08e-5), ("3 N/M", "N/m", 3.0),
+        ("2 mils", "m", 5.08e-5), ("3 N/M", "N/m", 3.0), ("3 Âµm", "m", 3e-6),
         ("30 RPM", "rad/s", 3.141592653589793),
     ],
 )  # fmt: skip
