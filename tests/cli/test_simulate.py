@@ -50,7 +50,7 @@ def test_a_raw_record_becomes_a_sweep_that_fits(typed, root, tmp_path, paper_mod
     shutil.copy(tmp_path / "x/sweep.csv", tmp_path / "unnamed.csv")  # the table states the direction, not the name
     typed("init", "unnamed.csv", "-o", "unnamed.toml", *GEOMETRY)
     assert 'direction = "axial"' in (tmp_path / "unnamed.toml").read_text(encoding="utf-8")
-    snippet = done.stderr.partition("add the path):")[2]
+    snippet = "[[sweeps]]" + done.stderr.partition("[[sweeps]]")[2]
     loop = '[[loops]]\nfile = "loop_axial_1.csv"\ndirection = "axial"\n'
     (tmp_path / "x/campaign.toml").write_text(BUSHING + loop + snippet, encoding="utf-8")
     fitted = typed("fit", "x/campaign.toml", "-o", "fit", "--no-plots", "--json")

@@ -85,7 +85,7 @@ def test_every_command_is_among_them():
 UNEXPECTED = {
     "a Prony series needs a long term modulus",
     "a rig or sleeve is too compliant to be simulated in time", "module | has no attribute", "no FMU for this system",
-    "no Dask worker is left", "no worker process starts",
+    "no Dask worker is left", "no worker process starts", "not all cycles are steps",
     "the compiler of the FMU failed", "the connection to the Dask scheduler is lost",
     "the effect | of | cannot be imported",
     "the effect is Python code which bushfit runs only with your permission", "the files contain several directions",
