@@ -57,12 +57,14 @@ class LoopHarmonics(NamedTuple):
 
     Args:
         motion: complex harmonics of the displacement that exceed its noise, mean first [m or rad].
+        motion_scatter: standard deviation of the displacement of the rows from its harmonics [m or rad].
         force: complex harmonics of the force, mean first [N or N m].
         force_noise: standard deviation of one row's force [N or N m].
         outliers: outliers of the columns "displacement" and "force", by name.
     """
 
     motion: Array
+    motion_scatter: float
     force: Array
     force_noise: float
     outliers: Mapping[str, OutlierRows]
@@ -142,7 +144,7 @@ def loop_harmonics(loop: Loop, frequency: float, cycles: float, *, from_rest: bo
     motion = _remove_noise(as_complex(solution[:, 0]), motion_noise, phase, values[:, 0], of_motion)
     scatter, unknowns = remove_slow_changes(phase[of_force], remainder[of_force, 1])
     force_noise = float(np.sqrt(np.sum(np.square(scatter)) / max(freedom[1] - unknowns, 1)))
-    return LoopHarmonics(motion, as_complex(solution[:, 1]), force_noise, outliers)
+    return LoopHarmonics(motion, motion_noise, as_complex(solution[:, 1]), force_noise, outliers)
 
 
 def _remove_noise(coefficients: Array, noise: float, phase: Array, displacement: Array, inliers: Array) -> Array:

@@ -26,6 +26,7 @@ from bushfit.fitting.repeats import FLOOR
 from bushfit.fitting.row_noise import noise_harmonics_of_single_cycle, row_noise
 from bushfit.reading.measurement import Loop
 from bushfit.reading.preload import Preload
+from bushfit.reduction.arrays import difference_noise
 from bushfit.reduction.harmonics import as_complex, basis, least_squares, series
 from bushfit.reduction.turning_points import reversals
 from bushfit.units import number
@@ -33,6 +34,10 @@ from bushfit.units import number
 #: Largest difference of the amplitude of the mean cycle from half the range of the record, relative to that half;
 #: chosen: noise and drift of a steady loop are smaller. Rows that are enough to find the range.
 _UNEQUAL, _ENOUGH_ROWS = 0.15, 100_000
+#: Root mean square difference of the displacement from its mean cycle, without noise and relative to the amplitude:
+#: from which on cycles are unequal, and from which on they are no loop, whose mean has then lost 4 % of its amplitude;
+#: chosen: rigs keep a motion within 1 %, and a drift adds some per cent.
+_MISFIT, _NOT_PERIODIC = 0.05, 0.2
 #: Share of the amplitude, or of half the force's range, above which a mean is reported as a preload; chosen: zero
 #: errors of sensors are smaller.
 TOLD_MEAN = 0.05
@@ -101,6 +106,7 @@ def prepare_loop(loop: Loop, *, without_outliers: bool = False) -> MeasuredLoop:
         faulty_rows=found.outliers,
         first_row=first_row,
     )
+    unequal = _unequal_cycles(prepared, found.motion_scatter)
     prepared = _with_row_noise(prepared, found)
     prepared = replace(prepared, weights=np.where(_at_reversal(prepared), 0.0, prepared.weights))
     _check_loses_energy(prepared)
@@ -112,20 +118,44 @@ def prepare_loop(loop: Loop, *, without_outliers: bool = False) -> MeasuredLoop:
         preload = float(mean) if abs(mean) - np.hypot(cosine, sine) > _PRELOADED * half_force else None
         unknown = prepared.has_predecessor or abs(found.motion[0]) > 0.01 * float(prepared.amplitude[0])
         prepared = replace(prepared, datum=float(found.force[0].real) if unknown else preload)
-    notes = [*prepared.record_notes, *_unequal_cycles(prepared), *_preload_notes(prepared)]
+    notes = [*prepared.record_notes, *unequal, *_preload_notes(prepared)]
     return replace(prepared, record_notes=tuple(notes))
 
 
-def _unequal_cycles(prepared: MeasuredLoop) -> list[Caveat]:
-    """Warn of a mean cycle whose amplitude differs from half the range of the record: the cycles are unequal."""
-    rows = prepared.test.displacement[:: -(-prepared.test.displacement.size // _ENOUGH_ROWS)]
-    recorded, amplitude = float(np.ptp(np.quantile(rows, (0.01, 0.99)))) / 2.0, float(prepared.amplitude[0])
-    if abs(amplitude / recorded - 1.0) <= _UNEQUAL:
+def _unequal_cycles(prepared: MeasuredLoop, scatter: float) -> list[Caveat]:
+    """Compare the mean cycle of a loop with the rows that it is made of.
+
+    Args:
+        prepared: the loop.
+        scatter: standard deviation of the displacement of the rows from the mean cycle [m, rad or 1].
+
+    Returns:
+        A warning if the cycles are unequal, or an empty list.
+
+    Raises:
+        FitError: the mean cycle does not reproduce the rows.
+    """
+    motion, amplitude = prepared.test.displacement, float(prepared.amplitude[0])
+    rows = motion[:: -(-motion.size // _ENOUGH_ROWS)]
+    recorded = float(np.ptp(np.quantile(rows, (0.01, 0.99)))) / 2.0
+    misfit = 0.0
+    if scatter > _MISFIT * amplitude:  # which may be noise
+        misfit = float(np.sqrt(max(scatter**2 - float(difference_noise(motion, 3)) ** 2, 0.0))) / amplitude
+    if abs(amplitude / recorded - 1.0) <= _UNEQUAL and misfit <= _MISFIT:
         return []
     unit, factor = prepared.test.direction.display.displacement
     sizes = (
         f"{number(factor * amplitude, 3)} {unit}, half the range of the record is {number(factor * recorded, 3)} {unit}"
     )
+    if misfit > _NOT_PERIODIC:
+        raise FitError(
+            "the cycles of the loop are not equal",
+            file=prepared.test.source.file if prepared.test.source else None,
+            found=f"{prepared.cycles:.3g} cycles at {float(prepared.frequency[0]):.4g} Hz; their mean has an amplitude "
+            f"of {sizes}; the displacement differs from it by {100 * misfit:.0f} % of the amplitude",
+            expected=f"a difference of {100 * _NOT_PERIODIC:.0f} % or less",
+            hint="is this a swept sine, or two sines at a time? A loop needs cycles of one amplitude, rate and mean",
+        )
     return [Caveat("unequal_cycles", f"the cycles are not equal: their mean has an amplitude of {sizes}")]
 
 

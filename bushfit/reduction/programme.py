@@ -24,10 +24,10 @@ ENOUGH_ROWS = 200_000
 THREE_CYCLES = 2.95
 #: Largest difference from the motion a period later, relative to its range, with which a motion is periodic.
 SAME_MOTION = 0.05
-#: Largest relative difference of two equal half cycles or periods; chosen: rigs are more even.
+#: Largest relative difference of two equal half cycles, or of the periods within one part; chosen: rigs are more even.
 _SAME_RATE = 0.08
-#: [ln] Largest change of the period within one part; chosen: far more than any rig wanders.
-_WIDEST_RATE = 0.2
+#: Share of the range of a steady part from which on a stroke is similar to its strokes.
+_SIMILAR = 0.7
 #: Largest relative difference of the ranges of two parts with one amplitude; chosen: rigs step by more.
 _SAME_AMPLITUDE = 0.08
 #: Distance from an end of the record, relative to a cycle, up to which a part is extended to that end.
@@ -133,18 +133,34 @@ def steady_spans(loop: Loop, time: Floats, motion: Floats) -> list[SteadySpan]:
     inner = np.abs(np.diff(motion[turns]))[1:-1]
     periods = time[turns[3:-1]] - time[turns[1:-3]]
     changes = [float(np.ptp(np.log(values))) for values in (inner, periods) if values.size]
-    if not spans and inner.size >= 4 and max(changes) > 0.3:  # no rig misses its amplitude or rate by a third
+    # no rig misses its amplitude or rate by a third
+    if inner.size >= 4 and (_is_modulated(spans, inner) if spans else max(changes) > 0.3):
         unit, factor = loop.direction.display.displacement
         low, high = factor * inner.min() / 2.0, factor * inner.max() / 2.0
         raise NoTestError(
             "no part of the record is a loop",
             file=loop.source.file if loop.source else loop.name,
             found=f"{inner.size / 2.0:.2g} cycles from {low:.3g} to {high:.3g} {unit} and from {periods.min():.3g} to "
-            f"{periods.max():.3g} {'s' if loop.has_recorded_time else 'rows'}, no two successive ones equal",
+            f"{periods.max():.3g} {'s' if loop.has_recorded_time else 'rows'}, "
+            f"{'few' if spans else 'no two'} successive ones equal",
             expected="at least two cycles of one amplitude and rate",
             hint="record five cycles of each amplitude; for a road load, use bushfit respond or [[validation]]",
         )
     return spans
+
+
+def _is_modulated(spans: Sequence[SteadySpan], strokes: Floats) -> bool:
+    """Return True if alike parts of a motion hold less than half of its strokes: beats, or a sine on a slow motion.
+
+    Args:
+        spans: parts of constant amplitude and rate.
+        strokes: ranges of all strokes of the record [m or rad], (n,).
+    """
+    if len(spans) == 1 or not all(span.is_like(spans[0]) for span in spans[1:]):
+        return False
+    similar = strokes[strokes > _SIMILAR * spans[0].range]
+    is_uneven = float(np.ptp(np.quantile(similar, (0.1, 0.9)))) > _SAME_AMPLITUDE * spans[0].range
+    return is_uneven and 2.0 * sum(span.cycles for span in spans) < 0.5 * similar.size
 
 
 def _single_cycles(parts: Sequence[tuple[Floats, Floats, Integers]], noise: float) -> list[SteadySpan]:
@@ -187,8 +203,8 @@ def _spans_of_part(time: Floats, motion: Floats, turns: Integers, noise: float) 
     for strokes in _alike_runs(size, same_size):
         halves = np.diff(across[strokes])
         for run in _alike_runs(halves, _SAME_RATE * halves):
-            if np.ptp(np.log(halves[run][1:] + halves[run][:-1])) > _WIDEST_RATE:
-                continue  # a swept sine
+            if np.ptp(np.log(halves[run][1:] + halves[run][:-1])) > _SAME_RATE:
+                continue  # a swept sine, or two neighbouring rates
             first, last = strokes.start + run.start, strokes.start + run.stop
             begin, end = float(across[first]), float(across[last])
             period, stroke = 2.0 * (end - begin) / (last - first), float(np.median(size[first : last + 1]))
