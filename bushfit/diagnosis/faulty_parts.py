@@ -81,13 +81,10 @@ class FaultyPart(Explanation):
         return by_family.get(self.family, ("shift", "gain", "points"))
 
     def in_form(self, form: Form) -> FaultyPart:
-        """Replace the common shift of this part by errors of another form.
+        """Return this part with errors of another form in place of the common shift.
 
         Args:
             form: errors of the points; "points" gives one column for each residual of the part's points.
-
-        Returns:
-            Faulty part of the same points, with the errors of this form.
         """
         assert self.group is not None
         group = self.group

@@ -297,10 +297,7 @@ class MeasuredSweep(MeasuredBase):
         return self.line_errors.whiten(self.run_errors.whiten(rows))
 
     def noise_sensitivity(self, influence: Array) -> dict[Hashable, Array]:
-        """Change of k parameter estimates by an error of each estimated noise variance; see `MeasuredLoop`.
-
-        Returns:
-            Changes of the whitened influence by estimated variance.
+        """Return changes of k estimates by an error of each estimated noise variance; see `MeasuredLoop`.
 
         Notes:
             Within a block the derivatives of V are I with respect to s^2 and 1 1^T with respect to t^2; whitened, W^2
