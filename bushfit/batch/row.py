@@ -132,7 +132,7 @@ def evaluate(row: Row, points: Sequence[Point], formats: Formats) -> tuple[RowFi
         campaign_name=campaign.name,
         verdict=diagnosis.verdict if diagnosis else None,
         effects=[effect.label for effect in effects],
-        alternatives=[*dict.fromkeys((*(other.label for effect in effects for other in effect.alternatives), *twins))],
+        alternatives=[*dict.fromkeys((*(rival.label for effect in effects for rival in effect.alternatives), *twins))],
         **to_entries(warnings_of(result, [*warnings, response_warnings], diagnosis.notes if diagnosis else ())),
         quantities=quantities,
         measured=measured,

@@ -51,7 +51,7 @@ def copied_points(sweeps: Sequence[Sweep]) -> dict[tuple[int, int], list[int]]:
         index = run[0]
         equal_runs = (runs_at[points[index][row]] - {run} for row in rows)
         # a run of this sweep, or another sweep
-        originals = [{other if other[0] == index else (other[0], None) for other in equal} for equal in equal_runs]
+        originals = [{twin if twin[0] == index else (twin[0], None) for twin in equal} for equal in equal_runs]
         for original in sorted(number for number, _ in set.intersection(*originals))[:1]:
             copies[index, original] += rows
             for row in rows:

@@ -153,11 +153,11 @@ class DiagnosisWriter:
         rest = "the rest of the gap" if self.finding.names else "the gap"
         sentences = [undecided_text(reported)]
         sentences += [f"a smooth correction closes {rest}: {gap.sentence}"] if gap else []
-        others = tuple(composition for composition in reported if composition is not leader)
-        entries = self._record_entries(leader, others)
+        rivals = tuple(composition for composition in reported if composition is not leader)
+        entries = self._record_entries(leader, rivals)
         if not entries:
             why = probability_text(leader, self.finding)
-            entries = [NamedCause(name, why, others) for name in leader.names]
+            entries = [NamedCause(name, why, rivals) for name in leader.names]
         faulty = next((composition.best for composition in reported if composition.faulty_parts), None)
         advice = self._deciding_advice(leader)
         return self._build(closing, "; ".join(sentences), entries, places=faulty, next_test=advice)

@@ -251,8 +251,8 @@ def averaged(processes: Sequence[Discrepancy]) -> Unnamed:
         Correction at the nodes, with its standard deviation, both relative to the stiffness.
     """
     best = max(processes, key=lambda process: process.best[0])
-    least = best.best[0] + np.log(_COUNTS)
-    processes = [process for process in processes if process.groups == best.groups and process.best[0] > least]
+    lower_limit = best.best[0] + np.log(_COUNTS)
+    processes = [process for process in processes if process.groups == best.groups and process.best[0] > lower_limit]
     share = np.exp([process.best[0] - best.best[0] for process in processes])
     share /= share.sum()
     freedom = float(share @ [process.likelihood.freedom(process.best[1]) for process in processes])

@@ -117,10 +117,10 @@ def undetermined_parameters(
             effect = effect_name_of(name)
             remark = f": these tests do not show {effect}" * (effect in unseen)
             lines.append(Caveat("no_difference", f"{name} does not differ from {neutral[name]:g}{remark}"))
-        shown = [i for i, name in enumerate(names) if name not in zero and effect_name_of(name) not in unseen]
-        if not shown:
+        visible = [i for i, name in enumerate(names) if name not in zero and effect_name_of(name) not in unseen]
+        if not visible:
             return lines
-        rows, groups = _open_groups([names[i] for i in shown], slopes[shown])
+        rows, groups = _open_groups([names[i] for i in visible], slopes[visible])
     if not groups:
         return []
     combinations = dict[str, None]()

@@ -266,18 +266,18 @@ def distribute_options(sources: Sequence[TestSource], test_options: Mapping[str,
     return [replace(source, test_options=keys) for source, keys in zip(sources, by_source, strict=True)]
 
 
-def check_one_level(sources: Sequence[TestSource], key: str, stated: str) -> None:
+def check_one_level(sources: Sequence[TestSource], key: str, option_text: str) -> None:
     """Check that the names of tests allow one amplitude or frequency for all of them.
 
     Args:
         sources: tests to which the option applies.
         key: "at_amplitude" or "at_frequency".
-        stated: the option, such as "0.1 mm"; its unit completes a name without one, such as "A=0.5".
+        option_text: value of the option, such as "0.1 mm"; its unit completes a name without one, such as "A=0.5".
 
     Raises:
         MeasurementError: the names state different amplitudes or frequencies.
     """
-    unit = stated.lstrip("+-.,0123456789eE ")
+    unit = option_text.lstrip("+-.,0123456789eE ")
     levels = dict[str, str]()
     for source in sources:
         names = [name for name in (source.sheet, source.file.stem) if name]
@@ -289,7 +289,7 @@ def check_one_level(sources: Sequence[TestSource], key: str, stated: str) -> Non
         option = f"--{key.replace('_', '-')}"
         raise MeasurementError(
             f"{option} applies to all these tests, and their names state different values",
-            found=f"{option} {stated}; " + ", ".join(f"{level} in {name}" for name, level in levels.items()),
+            found=f"{option} {option_text}; " + ", ".join(f"{level} in {name}" for name, level in levels.items()),
             expected="one value for all tests, or no such option",
             hint=f"leave {option} out and write the value with its unit into each name, or state {key} for each test "
             "in the campaign",

@@ -210,14 +210,17 @@ def contradicting_lines(table: Table, time: Floats | None) -> Iterator[Caveat]:
     Args:
         table: table of the test.
         time: recorded time [s], (n,); None for a sweep, or if the file has no time.
+
+    Yields:
+        A warning for each contradiction.
     """
     for line in table.lines_above:
         words = [word for word in _WORD.findall(line.text) if word != "in"]
-        stated = [word for word in words if is_unit(word)]
+        units = [word for word in words if is_unit(word)]
         is_list_of_units = any(plain(word) in UNIT_NAMES for word in words) or _IN_UNIT.search(line.text)
         for column in table.roles.values() if is_list_of_units and not re.search(r"\d", line.text) else ():
             unit = column.unit or ""
-            scales = [si_factor(word, unit) for word in stated if unit and is_compatible(word, unit)]
+            scales = [si_factor(word, unit) for word in units if unit and is_compatible(word, unit)]
             if scales and si_factor(unit, unit) not in scales:
                 sentence = f'line {line.number} states "{line.text}", the unit of "{column.header}" is {unit}'
                 yield Caveat("wrong_label", sentence)

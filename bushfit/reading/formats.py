@@ -103,11 +103,11 @@ def _in_struct(path: str, content: Mapping[str, Any]) -> Iterator[Group]:
         elif isinstance(value, list):
             inner |= {f"{place}({n})": one for n, one in enumerate(value, start=1) if isinstance(one, Mapping)}
     if len(levels) == 1:
-        others = [one for one in channels if one is not levels[0]]
+        remaining = [one for one in channels if one is not levels[0]]
         for n, level in enumerate(levels[0].values):
             of_level = [Channel(name, value[:, n]) for name, value in matrices.items()]
             title = f"{path} {levels[0].name} = {level:g}".strip()
-            yield title, others + of_level, [*labels, (levels[0].name, f"{level:g}")]
+            yield title, remaining + of_level, [*labels, (levels[0].name, f"{level:g}")]
     else:
         for name, value in matrices.items():
             usual = [f"{name}(:,{n})" for n in range(1, value.shape[1] + 1)]
