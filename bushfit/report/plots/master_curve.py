@@ -52,8 +52,7 @@ def master_curve_figure(model: Model, shifted_sweeps: Sequence[ShiftedSweep], ti
         pair.plot(frequency, model.stiffness(place, frequency, level), color=style.INK, lw=1.1, zorder=3)
         for axes in panels:
             style.logarithmic(axes, reach)
-        dots = [panels[-1].plot([], [], "o", color=looks[degree].color, mew=0)[0] for degree in degrees[::-1]]
-        style.legend(panels[-1], dots, [f"{degree:g} °C" for degree in degrees[::-1]], "temperature")
+        style.color_bar(panels[-1], [f"{degree:g} °C" for degree in degrees], "temperature")
     return figure.explain(
         f"Line: model at 23 °C, {', '.join(levels)}. Points: measured, shifted to 23 °C by the model."
     )

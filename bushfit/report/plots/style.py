@@ -314,13 +314,23 @@ def name_levels(
         marked: True for each curve that has measured points, (k,); empty if all have.
         extra_lines: further lines by their labels.
     """
-    looks = styles(len(levels), quantity)
     if len(levels) <= MOST_NAMED:
-        order = 1 if quantity == "amplitude" else -1
+        looks, order = styles(len(levels), quantity), 1 if quantity == "amplitude" else -1
         handles = [look.handle(points) for look, points in zip(looks, marked or [True] * len(looks), strict=True)]
         legend(axes, handles[::order], levels[::order], quantity, extra_lines)
-        return
-    edges = np.arange(len(levels) + 1) - 0.5
+    else:
+        color_bar(axes, levels, quantity)
+
+
+def color_bar(axes: Axes, levels: Sequence[str], quantity: str) -> None:
+    """Add a colour bar right of a panel, with a field for each level and labels for at most eight of them.
+
+    Args:
+        axes: panel.
+        levels: amplitude, frequency or temperature of each field as a text, in ascending order, (k,).
+        quantity: "amplitude", "frequency" or "temperature": title, and name of the colour scale.
+    """
+    looks, edges = styles(len(levels), quantity), np.arange(len(levels) + 1) - 0.5
     colors = ScalarMappable(BoundaryNorm(edges, len(levels)), ListedColormap([look.color for look in looks]))
     bar = axes.figure.colorbar(colors, cax=axes.inset_axes((1.04, 0.0, 0.05, 1.0)), drawedges=False)
     ticks = spread_indices(len(levels), MOST_NAMED)
