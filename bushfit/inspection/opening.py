@@ -24,7 +24,7 @@ from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.reading.names import NO_LABELS, Labels
 from bushfit.reading.preload import parse_preload
-from bushfit.reading.roles import PAIRS
+from bushfit.reading.roles import CONDITIONS, PAIRS
 from bushfit.reading.source import Channels, Sheet
 from bushfit.reading.stated import LoopFile, SweepFile
 from bushfit.reading.sweeps import read_sweep
@@ -239,8 +239,8 @@ def describe_columns(table: Table, *, is_sweep: bool) -> tuple[ColumnDescription
     Returns:
         The columns in order, with the range of their values in the unit of the file.
     """
-    ranged = {*chain(*PAIRS), "frequency", "amplitude", "temperature", "repeat"}
-    ranged = ranged if is_sweep else {"time", "displacement", "force"}
+    ranged = {*chain(*PAIRS), "frequency", "amplitude", "repeat"} if is_sweep else {"time", "displacement", "force"}
+    ranged |= {*CONDITIONS}
     wanted = {
         role: column for role, column in table.roles.items() if role in ranged and table.holds_numbers(column.index)
     }

@@ -1,6 +1,7 @@
 """Files of which a column says which test a row belongs to, as typed, and exports with blanks and empty cells."""
 
 import json
+import re
 import tomllib
 from collections.abc import Sequence
 from pathlib import Path
@@ -102,7 +103,8 @@ def test_temperatures_and_preloads_are_tests_of_their_own(typed, points, tmp_pat
         (level, *row[:2], row[2] * (1 + k / 10), row[3]) for k, level in enumerate(levels) for row in points["axial"]
     ]
     export(tmp_path / "axial.csv", (header, *HEADERS), rows)
-    typed("init", "axial.csv", *GEOMETRY, "-o", "x")
+    done = typed("init", "axial.csv", *GEOMETRY, "-o", "x")
+    assert re.findall("axial.csv, (.*): sweep", done.text) == [re.sub(' = "|"', " ", key).strip() for key in stated]
     text = (tmp_path / "x/campaign.toml").read_text(encoding="utf-8")
     assert [line for line in text.splitlines() if line in stated] == stated
     sweeps = load_campaign(tmp_path / "x/campaign.toml").sweeps
