@@ -3,7 +3,7 @@
 import hashlib
 import os
 from collections import Counter, defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import islice
 from pathlib import Path
@@ -17,7 +17,7 @@ from bushfit.campaign.simulated import SimulateSettings
 from bushfit.campaign.toml import parse_toml
 from bushfit.effects import effect_name_of, place_suffix, with_base
 from bushfit.errors import CampaignError, error_location, quote_path
-from bushfit.geometry import Bushing, Direction, Specimen, get_places
+from bushfit.geometry import Bushing, Direction, Place, Specimen, get_places
 from bushfit.model.laws import register_file
 from bushfit.model.model import FIVE, Model
 from bushfit.model.transfer import FACTOR_SPREAD
@@ -25,7 +25,8 @@ from bushfit.progress import track
 from bushfit.reading.headers import ZERO_TO_PEAK, split_convention
 from bushfit.reading.instruments import RECORDINGS
 from bushfit.reading.loops import read_loop
-from bushfit.reading.measurement import Loop, Sweep
+from bushfit.reading.measurement import AnyTest, Loop, Sweep
+from bushfit.reading.preload import Preload
 from bushfit.reading.stated import LoopFile, SweepFile, place_tested
 from bushfit.reading.sweeps import read_sweep
 from bushfit.reduction.displacement import prepare_record
@@ -114,17 +115,17 @@ def load_campaign(path: str | Path) -> Campaign:
         track(f"{kind} read", reader_keywords(path, tests, [*islice(names, len(tests))], specimens), len(tests))
         for kind, tests in (("loops", content.loops), ("sweeps", content.sweeps), ("records", content.validation))
     )
+    all_loops = [loop for keywords in loops for loop in split_record(read_loop(**keywords), keywords["test"])]
+    all_sweeps = [read_sweep(**keywords) for keywords in sweeps]
+    tests: list[Loop | Sweep] = [*all_loops, *all_sweeps]
+    units = {test.direction: test.preload.unit for test in tests if test.preload and test.preload.value}
     several = " and ".join(table.name for table in content.bushings)
     contents: dict[str, Any] = {
         "name": content.name or (bushing.name if bushing else several or specimens[0].body),
         "bushing": bushing,
         "specimens": specimens,
-        "loops": tuple(
-            without_copied_loops(
-                [loop for keywords in loops for loop in split_record(read_loop(**keywords), keywords["test"])]
-            )
-        ),
-        "sweeps": tuple(without_copied_points([read_sweep(**keywords) for keywords in sweeps])),
+        "loops": with_unit_of_zero(without_copied_loops(all_loops), units),
+        "sweeps": with_unit_of_zero(without_copied_points(all_sweeps), units),
         "validation": tuple(prepare_record(read_loop(**keywords), keywords["test"].lowpass) for keywords in records),
         "sha256": hashlib.sha256(path.read_bytes()).hexdigest(),
         "logo": logo,
@@ -299,6 +300,21 @@ def reader_keywords(
                 if level <= 0.0:
                     raise CampaignError("at_amplitude is not positive", found=f'"{amplitude}"', expected="above zero")
         yield keywords
+
+
+def with_unit_of_zero(tests: Sequence[AnyTest], units: Mapping[Place, str]) -> tuple[AnyTest, ...]:
+    """Tests of which those without preload ("none") have it in the unit of the other tests of their direction.
+
+    Args:
+        tests: loops or sweeps.
+        units: SI unit of the preloads by direction or specimen, m or N for example.
+    """
+    return tuple(
+        replace(test, preload=Preload(0.0, units.get(test.direction, test.preload.unit)))
+        if test.preload and not test.preload.value
+        else test
+        for test in tests
+    )
 
 
 def _test_names(tests: Sequence[LoopFile | SweepFile]) -> list[str]:

@@ -3,19 +3,17 @@
 from collections import Counter, defaultdict
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
 from bushfit.caveat import Caveat
-from bushfit.reading.measurement import Loop, Source, Sweep
+from bushfit.reading.measurement import AnyTest, Loop, Source, Sweep
 
 #: Minimum number of identical points that are copies; chosen: fewer may agree by chance in rounded files.
 _FEWEST_POINTS = 5
 #: Number of significant digits that are compared; later digits contain rounding errors of unit conversions.
 _DIGITS = 9
-
-_Test = TypeVar("_Test", Loop, Sweep)
 
 
 def group_copies(loops: Sequence[Loop]) -> list[list[Loop]]:
@@ -110,14 +108,14 @@ def _rounded_points(sweep: Sweep) -> list[list[float]]:
     return (np.round(numbers * scale) / scale).tolist()
 
 
-def _used_once(first: _Test, copies: Sequence[_Test]) -> Caveat | None:
+def _used_once(first: AnyTest, copies: Sequence[AnyTest]) -> Caveat | None:
     """Note on the copies of a test, with the names of their files; of one file, the names of the tests."""
     file = first.source.file if first.source else None
     names = [copy.source.file.name if copy.source and copy.source.file != file else copy.name for copy in copies]
     return Caveat("copied_tests", f"{_join_names(names)} with the same data: used once") if names else None
 
 
-def _with_note(test: _Test, note: Caveat | None) -> _Test:
+def _with_note(test: AnyTest, note: Caveat | None) -> AnyTest:
     """Add a warning, if any, to the notes on how the file of a test was read."""
     source: Source | None = test.source
     return replace(test, source=source.with_note(note)) if source and note else test

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Literal
+from typing import Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,8 @@ FEWEST_LOOP_ROWS = 10
 SAME_TEMPERATURE = 2.0
 #: Quantity that changes from point to point of a run of a sweep.
 Stepped = Literal["frequency", "amplitude"]
+#: A loop or a sweep.
+AnyTest = TypeVar("AnyTest", "Loop", "Sweep")
 
 #: Smallest prominence of a turning point of a loop, relative to its range; chosen: larger than noise.
 _TURN_PROMINENCE = 0.1

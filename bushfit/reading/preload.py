@@ -84,6 +84,4 @@ def distinct_preloads(preloads: Sequence[Preload]) -> list[Preload]:
     for preload in sorted(preloads):
         if not distinct or not preload.equals(distinct[-1]):
             distinct.append(preload)
-    mixed = len({preload.unit for preload in distinct if preload.value}) > 1
-    unit = next((preload.unit for preload in distinct if preload.value), distinct[0].unit if distinct else "")
-    return [] if mixed else [Preload(preload.value, unit) for preload in distinct]
+    return distinct if len({preload.unit for preload in distinct}) == 1 else []

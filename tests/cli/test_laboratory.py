@@ -322,3 +322,6 @@ def test_a_stated_preload_is_one_of_those_in_the_file(lab, preload, status, prob
     options = ("--direction", "front", "--no-plots", "-o", preload)
     _, done = lab("fit", f"{preload}.toml", *options, status=status)
     assert problem in " ".join(done.text.split())
+    if not status:
+        table = pd.read_csv(folder / preload / "sweeps.csv")
+        assert [header for header in table if header.startswith("preload")] == ["preload [mm]"]
