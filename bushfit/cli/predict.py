@@ -102,7 +102,7 @@ def command(model: Path, campaign: Path | None, bushing: str | None, output: Out
         peak = f"resonance at {frequency:.4g} Hz, |T| {largest:.3g}"
         acceleration = resonance.base_acceleration / si_factor("g", "m/s^2")
         shaken = f"{resonance.mass:.5g} kg, base acceleration {acceleration:.4g} g"
-        output.print(f"{resonance.place} with a mass of {shaken}: {peak}")
+        output.print(f"{resonance.label} with a mass of {shaken}: {peak}")
     for curve in predicted.static:
         _print_static(output, curve)
     for part in predicted.arms:
@@ -168,9 +168,8 @@ def _print_static(output: Output, curve: StaticCurve) -> None:
 
 def print_predictions(output: Output, predicted: PredictionOutput) -> None:
     """Print the rows of each prediction table at the lowest and highest frequency, and collect its warnings."""
-    from bushfit.effects.temperature import REFERENCE
     from bushfit.report.tables import prediction_table, spread_indices
-    from bushfit.units import CELSIUS, format_aligned, number
+    from bushfit.units import format_aligned, number
 
     for prediction in predicted.predictions:
         table = prediction_table(prediction)
@@ -186,8 +185,6 @@ def print_predictions(output: Output, predicted: PredictionOutput) -> None:
                 value, *limits = format_aligned([row[name], *band], digits)
                 cells.append(f"{value} ({' to '.join(limits)})" if band[0] < band[1] else value)
             rows.append(cells)
-        temperature = (prediction.temperature or REFERENCE) - CELSIUS
-        condition = f" at {number(temperature, 3)} degC" if "temperature" in predicted.result.model.depends_on else ""
-        title = f"{owner}{prediction.label}{condition}, first and last frequency, with 95 % bands"
+        title = f"{owner}{prediction.label}, first and last frequency, with 95 % bands"
         output.print_table(title, list(table.columns[:4]), rows, text_columns=0)
     output.warn(predicted.warnings)

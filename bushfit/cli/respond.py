@@ -73,10 +73,10 @@ def print_response(output: Output, response: ResponseOutput) -> None:
     """Print peak and rms force, power, largest strain and rate of each direction, and collect the warnings."""
     from bushfit.units import number
 
-    step = response.responses[0].history.step
+    duration = number(response.responses[0].history.step * response.time.size, 3)
+    labels = ", ".join(part.label for part in response.responses)
     output.print_headline(
-        response.result.name,
-        f"force over {number(step * response.time.size, 3)} s, {response.time.size} rows, with 95 % bands",
+        response.result.name, f"{labels}: force over {duration} s, {response.time.size} rows, with 95 % bands"
     )
     rows = []
     for part in response.responses:

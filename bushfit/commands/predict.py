@@ -112,14 +112,7 @@ def predict(
         campaign, shape_notes = _assign_bushing(campaign, result)
         notes = (*notes, *shape_notes)
     sweeps = campaign.sweeps if campaign else ()
-    depends_on_temperature = "temperature" in result.model.depends_on
-    if temperature is not None and not depends_on_temperature:
-        raise ModelError(
-            "the model has no effect of temperature",
-            found=f"{temperature - CELSIUS:.4g} degC requested",
-            expected="a model with the effect of temperature",
-            hint="fit tests at several temperatures with --effect temperature",
-        )
+    check_temperature(result, temperature)
     if len(preloads) > 1 and (wide or mass):
         problem = "wide tables and resonances require a single preload"
         raise ModelError(problem, found=", ".join(preloads), expected="one, or none")
@@ -133,7 +126,7 @@ def predict(
     compared_sweeps = [
         sweep
         for sweep in measured
-        if not depends_on_temperature
+        if "temperature" not in result.model.depends_on
         or (tested := sweep.conditions.temperature) is None
         or abs(np.mean(tested) - (temperature or REFERENCE)) <= SAME_TEMPERATURE
     ]
@@ -160,7 +153,7 @@ def predict(
             resonances.append(predict_resonance(result, place, *shaken, temperature=temperature, preload=preload))
         if static or static_rates:
             reach = static_reach(result, place, prediction.amplitude, settings)
-            rate, load = static_rate(result, place, static_rates), prediction.preload if preloads else None
+            rate, load = static_rate(result, place, static_rates), prediction.conditions.preload if preloads else None
             curves.append(static_curve(result, place, reach, rate, temperature=temperature, preload=load))
     maxwell: tuple[Arms, ...] = ()
     if arms:
@@ -176,6 +169,17 @@ def predict(
     notes = (*notes, *(note.about(sweep.name) for sweep in measured for note in sweep.notes))
     output = PredictionOutput(result, predictions, measured, notes, resonances, maxwell, curves)
     return replace(output, files=prediction_files(output, wide=wide))
+
+
+def check_temperature(result: Result, temperature: float | None) -> None:
+    """Raise a ModelError if a temperature [K] is requested of a model that does not depend on it."""
+    if temperature is not None and "temperature" not in result.model.depends_on:
+        raise ModelError(
+            "the model has no effect of temperature",
+            found=f"{temperature - CELSIUS:.4g} degC requested",
+            expected="a model with the effect of temperature",
+            hint="fit tests at several temperatures with --effect temperature",
+        )
 
 
 def _assign_bushing(campaign: Campaign, result: Result) -> tuple[Campaign, list[Caveat]]:

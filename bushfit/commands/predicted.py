@@ -133,8 +133,7 @@ def prediction_files(output: PredictionOutput, *, wide: bool) -> list[ResultFile
     def draw(prediction: Prediction) -> Figure:
         """Draw a prediction with the measured sweeps of its direction, and with the warnings below the figure."""
         place = prediction.direction
-        title = result.name if isinstance(place, Direction) else str(place)
-        title += f", over {prediction.over.describe(place)}" if prediction.over else ""
+        title = prediction.add_conditions(result.name if isinstance(place, Direction) else str(place))
         note = plots.style.warnings_note(warnings_of(result, [], (*prediction.warnings, *output.notes)))
         table = measured.content() if output.measured else None
         return plots.prediction.prediction_figure(result, prediction, table, title, note)

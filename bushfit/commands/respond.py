@@ -12,6 +12,7 @@ import numpy as np
 
 from bushfit.caveat import Caveat, WarningEntries, to_entries
 from bushfit.commands.loading import HasResult, as_result
+from bushfit.commands.predict import check_temperature
 from bushfit.effects.contract import Array
 from bushfit.effects.history import History
 from bushfit.errors import MeasurementError
@@ -99,9 +100,10 @@ def respond(
 
     Raises:
         MeasurementError, UnitError: a history that cannot be used.
-        ModelError: an effect of the model has no law in time.
+        ModelError: an effect of the model has no law in time, or the model does not depend on temperature.
     """
     result = as_result(model)
+    check_temperature(result, temperature)
     if isinstance(history, str | Path):
         channels = read_displacements(
             Path(history), direction, result.specimens, columns=columns, units=units, file_format=file_format

@@ -9,14 +9,14 @@ from functools import partial
 import numpy as np
 
 from bushfit.caveat import Caveat
-from bushfit.effects.contract import Array, RubberConditions
+from bushfit.effects.contract import UNKNOWN, Array, RubberConditions
 from bushfit.errors import ModelError
 from bushfit.geometry import TRANSLATION, Place
 from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.prediction.bands import alternative_models, car_models
 from bushfit.prediction.caveats import extrapolations, unfitted_warnings
-from bushfit.prediction.stiffness import tested_preload
+from bushfit.prediction.stiffness import add_conditions, rubber_conditions
 from bushfit.reading.preload import Preload
 from bushfit.reduction.resonance import shaken_response
 from bushfit.units import number
@@ -47,6 +47,7 @@ class PredictedResonance:
         warnings: warnings on a direction that was not fitted, on frequencies and strains near the peak outside the
             fitted range, and on unresolved effects.
         if_in_rig: response if the unresolved effects belong to the rig, not to the bushing; None without such effects.
+        conditions: preload and temperature of the rubber, as of `rubber_conditions`.
     """
 
     place: Place
@@ -58,6 +59,12 @@ class PredictedResonance:
     stiffness: Array
     warnings: tuple[Caveat, ...] = ()
     if_in_rig: PredictedResonance | None = None
+    conditions: RubberConditions = UNKNOWN
+
+    @property
+    def label(self) -> str:
+        """Direction or specimen for users, with its conditions: "axial at a preload of 500 N"."""
+        return add_conditions(str(self.place), self.conditions, self.place)
 
     @property
     def peak(self) -> tuple[float, float]:
@@ -96,7 +103,7 @@ def predict_resonance(
     if place.motion is not TRANSLATION:
         raise ModelError("a mass needs a translation", found=str(place), expected="axial, radial or a mount")
     bushings, *rig_models = car_models(result.model, result.unresolved)
-    conditions = RubberConditions(temperature, preload=tested_preload(result, place, preload))
+    conditions = rubber_conditions(result, place, temperature, preload)
     if frequencies is None:
         small = bushings.stiffness(place, 1.0, _SMALL_STRAIN / bushings.unit_strain(place), conditions=conditions)
         resonance = float(np.sqrt(np.abs(small) / mass)) / (2.0 * np.pi)
@@ -128,4 +135,4 @@ def predict_resonance(
         peak, ratio = (number(value, 4) for value in if_in_rig.peak)
         sentence = f"at {peak} Hz, |T| {ratio}, if {' and '.join(result.unresolved)} belongs to the rig"
         warnings.append(Caveat("resonance_if_rig", sentence).about(subject))
-    return replace(predicted, warnings=tuple(warnings), if_in_rig=if_in_rig)
+    return replace(predicted, warnings=tuple(warnings), if_in_rig=if_in_rig, conditions=conditions)

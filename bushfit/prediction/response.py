@@ -6,7 +6,7 @@ import numpy as np
 from scipy.fft import next_fast_len
 
 from bushfit.caveat import Caveat
-from bushfit.effects.contract import Array, RubberConditions
+from bushfit.effects.contract import UNKNOWN, Array, RubberConditions
 from bushfit.effects.history import History
 from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.geometry import Place, Specimen
@@ -16,6 +16,7 @@ from bushfit.model.result import Result
 from bushfit.model.sensitivity import force_and_slopes
 from bushfit.prediction.bands import Band, envelope, uncertainty
 from bushfit.prediction.caveats import BEYOND, MARGIN, extrapolations, unfitted_warnings
+from bushfit.prediction.stiffness import add_conditions, rubber_conditions
 from bushfit.prediction.superposed import correction_factor, timed_candidates
 from bushfit.reduction.displacement import noise_and_highest_frequency
 from bushfit.units import number
@@ -44,6 +45,7 @@ class TimeResponse:
         unit_strain: equivalent strain per displacement [1/m, 1/rad or 1].
         tested: largest strain [1] and strain rate [1/s] of the fitted tests; None if the model was not fitted.
         warnings: warnings on extrapolation and on effects that are left out or constant.
+        conditions: temperature and preload of the rubber, as of `rubber_conditions`.
     """
 
     direction: Place
@@ -52,6 +54,12 @@ class TimeResponse:
     unit_strain: float
     tested: tuple[float, float] | None = None
     warnings: tuple[Caveat, ...] = ()
+    conditions: RubberConditions = UNKNOWN
+
+    @property
+    def label(self) -> str:
+        """Direction or specimen for users, with its conditions: "axial at 60 degC"."""
+        return add_conditions(str(self.direction), self.conditions, self.direction)
 
     @property
     def peak(self) -> float:
@@ -118,7 +126,7 @@ def time_response(
     Raises:
         ModelError: an effect of the model has no law in time.
     """
-    conditions = RubberConditions(temperature)
+    conditions = rubber_conditions(result, place, temperature)
     left_out = {effect.name for effect in result.model.records if history.periodic and effect.is_transient}
     timed = replace(
         result,
@@ -129,7 +137,8 @@ def time_response(
     )
     models, untimed = timed_candidates(timed, str(place), rig=rig)
     force = envelope([_force(source, model, place, history, conditions) for source, model in models])
-    response = TimeResponse(place, history, force, result.model.unit_strain(place), _tested_strains(result))
+    unit_strain, tested = result.model.unit_strain(place), _tested_strains(result)
+    response = TimeResponse(place, history, force, unit_strain, tested, conditions=conditions)
     return replace(response, warnings=(*_warnings(result, response, sorted(left_out), temperature), *untimed))
 
 
@@ -141,7 +150,7 @@ def _force(result: Result, model: Model, place: Place, history: History, conditi
         model: the fitted model or a variant with other effects.
         place: direction or specimen.
         history: displacement [m, rad or 1], (n,).
-        conditions: temperature of the rubber.
+        conditions: temperature and preload of the rubber.
 
     Notes: the model's relative errors of real and imaginary part multiply the force and its Hilbert transform. The
     largest of three errors is used: at the mean frequency and the peak amplitude; at the mean frequency and the
@@ -177,7 +186,7 @@ def _corrected_force(force: Array, model: Model, place: Place, history: History,
         model: model with the correction.
         place: direction or specimen.
         history: displacement [m, rad or 1], (n,).
-        conditions: temperature of the rubber.
+        conditions: temperature and preload of the rubber.
 
     Returns:
         Corrected force [N, N m or Pa], (n,). Each frequency is multiplied by the ratio of the stiffness with and

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bushfit.caveat import Caveat
-from bushfit.effects.contract import Array, RubberConditions
+from bushfit.effects.contract import UNKNOWN, Array, RubberConditions
 from bushfit.effects.history import History
 from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.geometry import Place
@@ -15,9 +15,9 @@ from bushfit.model.result import Result
 from bushfit.model.sensitivity import force_and_slopes
 from bushfit.prediction.bands import Band, envelope, uncertainty
 from bushfit.prediction.caveats import extrapolations
-from bushfit.prediction.stiffness import tested_preload
+from bushfit.prediction.stiffness import add_conditions, rubber_conditions
 from bushfit.prediction.superposed import correction_factor, timed_candidates
-from bushfit.reading.preload import Preload, add_preload
+from bushfit.reading.preload import Preload
 from bushfit.units import number
 
 #: Default rate of a model without loops, in display units per minute (10 mm/min): common in static tests of rubber.
@@ -40,8 +40,7 @@ class StaticCurve:
         secant: static stiffness from end to end, (1,) [N/m, N m/rad or Pa].
         rate: rate of the motion [m/s, rad/s or 1/s].
         warnings: warnings on extrapolation, and on alternatives without a law in time.
-        preload: preload at which displacement and force are zero; None unless this direction was tested at several
-            preloads.
+        conditions: temperature, and preload at which displacement and force are zero, as of `rubber_conditions`.
     """
 
     direction: Place
@@ -53,12 +52,12 @@ class StaticCurve:
     secant: Band
     rate: float
     warnings: tuple[Caveat, ...] = ()
-    preload: Preload | None = None
+    conditions: RubberConditions = UNKNOWN
 
     @property
     def label(self) -> str:
-        """Direction or specimen for users, with the preload: "axial at a preload of 500 N"."""
-        return add_preload(str(self.direction), self.preload, self.direction)
+        """Direction or specimen for users, with its conditions: "axial at a preload of 500 N"."""
+        return add_conditions(str(self.direction), self.conditions, self.direction)
 
     @property
     def rate_text(self) -> str:
@@ -119,13 +118,13 @@ def static_curve(
         ModelError: an effect of the model has no law in time, or the preload is outside the tested range.
     """
     models, untimed = timed_candidates(result, f"{place}, static curve")
-    displacement, preload = np.linspace(-reach, reach, _POINTS), tested_preload(result, place, preload)
-    conditions = RubberConditions(temperature, preload=preload)
+    displacement = np.linspace(-reach, reach, _POINTS)
+    conditions = rubber_conditions(result, place, temperature, preload)
     parts = [_forces(source, model, place, displacement, rate, conditions) for source, model in models]
     loading, unloading, mean, slope, secant = (envelope(bands) for bands in zip(*parts, strict=True))
     point = np.array([rate / (4.0 * reach)]), np.array([reach])
     warnings = (*extrapolations(result, place, *point, temperature, f"{place}, static curve"), *untimed)
-    return StaticCurve(place, displacement, loading, unloading, mean, slope, secant, rate, warnings, preload)
+    return StaticCurve(place, displacement, loading, unloading, mean, slope, secant, rate, warnings, conditions)
 
 
 def _forces(

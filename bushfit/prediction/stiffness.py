@@ -16,7 +16,8 @@ import numpy as np
 
 from bushfit.caveat import Caveat
 from bushfit.effects import Level
-from bushfit.effects.contract import Array, RubberConditions
+from bushfit.effects.contract import UNKNOWN, Array, RubberConditions
+from bushfit.effects.temperature import REFERENCE
 from bushfit.errors import ModelError
 from bushfit.fitting.preparation import MeasuredSweep
 from bushfit.geometry import Place
@@ -33,9 +34,9 @@ from bushfit.prediction.caveats import (
     unfitted_warnings,
 )
 from bushfit.prediction.superposed import LargeMotion, superposed_stiffness_and_slopes, timed_candidates
-from bushfit.reading.preload import SAME_PRELOAD, Preload, add_preload
+from bushfit.reading.preload import SAME_PRELOAD, Preload
 from bushfit.reading.runs import nominal
-from bushfit.units import number
+from bushfit.units import CELSIUS, number
 
 #: Predicted quantities.
 _BANDS = ("stiffness", "loss_factor", "storage_stiffness", "loss_stiffness")
@@ -60,9 +61,8 @@ class Prediction:
             None without unresolved effects.
         measured: measured complex stiffness at these points, mean of the repeats, in the unit of |K|, (n,); nan at a
             point without a measurement; None without sweeps.
-        preload: preload of all points; None unless this direction was tested at several preloads.
+        conditions: preload and temperature of all points, as of `rubber_conditions`.
         over: slow large motion or static offset under the harmonic; None for the harmonic alone.
-        temperature: temperature of the rubber [K]; None for the reference temperature.
     """
 
     direction: Place
@@ -75,9 +75,8 @@ class Prediction:
     warnings: tuple[Caveat, ...] = ()
     if_in_rig: Prediction | None = None
     measured: Array | None = None
-    preload: Preload | None = None
+    conditions: RubberConditions = UNKNOWN
     over: LargeMotion | None = None
-    temperature: float | None = None
 
     @property
     def complex_stiffness(self) -> Array:
@@ -86,9 +85,13 @@ class Prediction:
 
     @property
     def label(self) -> str:
-        """Direction or specimen for users, with preload and large motion: "axial at a preload of 500 N"."""
-        label = add_preload(str(self.direction), self.preload, self.direction)
-        return f"{label} over {self.over.describe(self.direction)}" if self.over else label
+        """Direction or specimen for users, with conditions and large motion: "axial at a preload of 500 N"."""
+        return self.add_conditions(str(self.direction))
+
+    def add_conditions(self, text: str) -> str:
+        """Add preload, temperature and large motion to the text on a prediction, as in "axial at 60 degC over 1 mm"."""
+        text = add_conditions(text, self.conditions, self.direction)
+        return f"{text} over {self.over.describe(self.direction)}" if self.over else text
 
 
 def predict(
@@ -132,7 +135,7 @@ def predict(
     amplitude, frequency = (
         axis.ravel() for axis in np.meshgrid(np.unique(amplitudes), np.unique(frequencies), indexing="ij")
     )
-    conditions = RubberConditions(temperature, preload=tested_preload(result, direction, preload))
+    conditions = rubber_conditions(result, direction, temperature, preload)
     if over:
         models, untimed = timed_candidates(result, f"{direction}, with the large motion", rig=rig)
         over.check_superposable(direction, frequency)
@@ -151,9 +154,8 @@ def predict(
         **bands,
         if_in_rig=predictions[2 ** len(result.unresolved) - 1] if result.unresolved and not rig else None,
         measured=None if sweeps is None else measured_stiffness(direction, frequency, amplitude, sweeps),
-        preload=conditions.preload,
+        conditions=conditions,
         over=over,
-        temperature=temperature,
     )
     compared = replace(prediction, measured=None) if rig else prediction
     warnings = point_warnings(result, compared, temperature, preload)
@@ -202,6 +204,34 @@ def point_warnings(
         names = " and ".join(result.unresolved)
         sentence = f"stiffness {percent} if {names} belongs to the rig; the band, low to high, includes both"
         yield Caveat("stiffness_if_rig", sentence).about(place)
+
+
+def add_conditions(text: str, conditions: RubberConditions, place: Place) -> str:
+    """Add preload and temperature, if known, to the text on a prediction: "axial at a preload of 500 N and 60 degC".
+
+    Args:
+        text: text on the prediction.
+        conditions: conditions of the rubber, with a single temperature.
+        place: direction or specimen.
+    """
+    known = [] if conditions.preload is None else [f"a preload of {conditions.preload.text(place)}"]
+    known += [] if conditions.temperature is None else [f"{number(float(conditions.temperature) - CELSIUS, 3)} degC"]
+    return f"{text} at {' and '.join(known)}" if known else text
+
+
+def rubber_conditions(
+    result: Result, place: Place, temperature: float | None = None, preload: Preload | None = None
+) -> RubberConditions:
+    """Temperature and preload of a prediction; None in place of a condition on which the model does not depend.
+
+    Args:
+        result: fitted result.
+        place: direction or specimen.
+        temperature: temperature [K]; None for the reference temperature.
+        preload: requested preload, as of `tested_preload`.
+    """
+    kelvin = (REFERENCE if temperature is None else temperature) if "temperature" in result.model.depends_on else None
+    return RubberConditions(kelvin, preload=tested_preload(result, place, preload))
 
 
 def tested_preload(result: Result, place: Place, preload: Preload | None) -> Preload | None:

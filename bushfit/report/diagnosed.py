@@ -9,7 +9,7 @@ import pandas as pd
 from bushfit.diagnosis.record import Diagnosis, level_of
 from bushfit.effects import get_parameter
 from bushfit.fitting.preparation import MeasuredSweep
-from bushfit.report.tables import condition_columns, loops_table, sweeps_table
+from bushfit.report.tables import loops_table, sweep_condition_columns, sweeps_table
 
 #: Headers of the measured and modelled responses and of the outlier flag in the tables of loops and sweeps.
 _MEASURED = re.compile(
@@ -38,7 +38,7 @@ def gap_table(diagnosis: Diagnosis) -> pd.DataFrame:
         unit, factor = data_set.direction.display.displacement
         if isinstance(data_set, MeasuredSweep):
             responses = sweeps_table(diagnosis.result.model, [data_set])
-            columns |= {**condition_columns(data_set), "frequency [Hz]": data_set.frequency}
+            columns |= {**sweep_condition_columns(data_set), "frequency [Hz]": data_set.frequency}
             columns |= {f"amplitude [{unit}]": data_set.amplitude * factor, "repeat": data_set.repeat}
         else:
             responses = loops_table(diagnosis.result.model, [data_set])

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from bushfit.effects.contract import Array
+from bushfit.effects.contract import Array, RubberConditions
 from bushfit.errors import printable
 from bushfit.fitting.master_curve import ShiftedSweep
 from bushfit.fitting.preparation import MeasuredLoop, MeasuredSweep
@@ -87,8 +87,8 @@ def prediction_table(prediction: Prediction, display: Display | None = None) -> 
     Returns:
         Columns: frequency, amplitude, stiffness, loss factor, storage and loss stiffness; "low" and "high" ends of the
             last four; if there is an unresolved effect, the four again under the assumption that the effect belongs to
-            the rig; if known, measured stiffness and loss factor; if the tests have several preloads, the preload; and
-            the large motion, if there is one.
+            the rig; if known, measured stiffness and loss factor; temperature and preload, if the model depends on
+            them; and the large motion, if there is one.
     """
     (length, length_factor), _, (stiffness, factor) = display or prediction.direction.display
     motion_name, _, resisted = quantity_words(prediction.direction)
@@ -111,9 +111,7 @@ def prediction_table(prediction: Prediction, display: Display | None = None) -> 
         columns |= {f"{name}, {IF_RIGS}": getattr(rig, key).value * scale for name, (key, scale) in quantities.items()}
     if (measured := prediction.measured) is not None:
         columns |= {f"measured {force}": np.abs(measured) * factor, "measured loss factor [-]": loss_factor(measured)}
-    if prediction.preload is not None:
-        value, unit = prediction.preload.in_display_unit(prediction.direction)
-        columns[f"preload [{unit}]"] = value
+    columns |= condition_columns(prediction.conditions, prediction.direction)
     if over := prediction.over:
         columns["large motion, frequency [Hz]"] = over.frequency
         columns[f"large motion, displacement [{length}]"] = over.displacement * length_factor
@@ -159,6 +157,7 @@ def predicted_resonance_table(resonance: PredictedResonance) -> pd.DataFrame:
             "phase [deg]": np.degrees(np.angle(resonance.transmissibility)),
             **amplitude_column(resonance.place, resonance.amplitude),
             **response_columns(resonance.place, resonance.stiffness),
+            **condition_columns(resonance.conditions, resonance.place),
         }
     )
     if resonance.if_in_rig:
@@ -172,7 +171,7 @@ def static_table(curve: StaticCurve) -> pd.DataFrame:
 
     Returns:
         Columns: displacement, rate; mean, loading and unloading force, and stiffness (slope of the mean), each with
-        its "low" and "high" ends; preload, if the tests have several.
+        its "low" and "high" ends; temperature and preload, if the model depends on them.
     """
     (length, to_length), (_, to_force), (_, to_stiffness) = curve.direction.display
     _, stiffness, force = response_headers(curve.direction)
@@ -187,10 +186,7 @@ def static_table(curve: StaticCurve) -> pd.DataFrame:
         (stiffness, curve.slope, to_stiffness),
     ):
         columns |= band_columns(header, band, scale)
-    if curve.preload is not None:
-        value, unit = curve.preload.in_display_unit(curve.direction)
-        columns[f"preload [{unit}]"] = value
-    return pd.DataFrame(columns)
+    return pd.DataFrame(columns | condition_columns(curve.conditions, curve.direction))
 
 
 def arms_table(model: Model, arms: Sequence[Arms], places: Sequence[Place]) -> pd.DataFrame:
@@ -273,7 +269,7 @@ def sweeps_table(model: Model, data_sets: Sequence[MeasuredSweep]) -> pd.DataFra
                 {
                     "sweep": data_set.name,
                     "direction": str(place),
-                    **condition_columns(data_set),
+                    **sweep_condition_columns(data_set),
                     "frequency [Hz]": data_set.frequency,
                     **amplitude_column(place, data_set.amplitude),
                     "repeat": data_set.repeat,
@@ -290,19 +286,27 @@ def sweeps_table(model: Model, data_sets: Sequence[MeasuredSweep]) -> pd.DataFra
     return pd.concat(tables, ignore_index=True)
 
 
-def condition_columns(data_set: MeasuredSweep) -> dict[str, Any]:
+def condition_columns(conditions: RubberConditions, place: Place) -> dict[str, Any]:
+    """Columns of temperature and preload of a test or prediction, if they are known, by their headers."""
+    columns = dict[str, Any]()
+    if conditions.temperature is not None:
+        columns["temperature [degC]"] = conditions.temperature - CELSIUS
+    if conditions.preload is not None:
+        value, unit = conditions.preload.in_display_unit(place)
+        columns[f"preload [{unit}]"] = value
+    return columns
+
+
+def sweep_condition_columns(data_set: MeasuredSweep) -> dict[str, Any]:
     """Columns of `sweeps_table` on the conditions of a sweep: stepped quantity, temperature, preload, part, error.
 
     Returns:
         Values by column header: one value for the whole sweep, or one for each of its n points, (n,).
     """
     sweep, conditions = data_set.test, data_set.source.conditions if data_set.source else {}
+    kelvin = None if sweep.temperature is None else data_set.temperature
     columns: dict[str, Any] = {"stepped": sweep.stepped or "neither"}
-    if sweep.temperature is not None:
-        columns["temperature [degC]"] = data_set.temperature - CELSIUS
-    if sweep.preload is not None:
-        value, unit = sweep.preload.in_display_unit(sweep.direction)
-        columns[f"preload [{unit}]"] = value
+    columns |= condition_columns(RubberConditions(kelvin, preload=sweep.preload), sweep.direction)
     if "specimen_number" in conditions:
         columns["part"] = str(conditions["specimen_number"])
     if sweep.relative_error is not None:

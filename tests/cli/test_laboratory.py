@@ -170,9 +170,11 @@ def test_predictions_meet_the_truth_within_their_bands(lab, name, options, condi
     columns = [unit, f"{unit}, low", f"{unit}, high", *(f"loss factor [-]{end}" for end in ("", ", low", ", high"))]
     wanted = ends[["frequency [Hz]", amplitude, *columns]].to_numpy()
     assert np.array(rows) == pytest.approx(wanted, rel=0.006)
-    if "preload" in conditions:
-        assert (table["preload [mm]"] == 1e3 * conditions["preload"]).all()
-        assert f"{name} at a preload of {1e3 * conditions['preload']:g} mm: stiffness" in done.text
+    warm, preload = conditions.get("temperature", 23.0), conditions.get("preload")
+    at = f"{warm:g} degC" if preload is None else f"a preload of {1e3 * preload:g} mm and {warm:g} degC"
+    assert f"{name} at {at}: " in done.text
+    assert set(table["temperature [degC]"]) == {warm}
+    assert preload is None or (table["preload [mm]"] == 1e3 * preload).all()
 
 
 def test_a_measured_record_is_met_by_respond_and_validation(lab):
@@ -184,6 +186,7 @@ def test_a_measured_record_is_met_by_respond_and_validation(lab):
     table, measured = pd.read_csv(folder / "response/response.csv"), pd.read_csv(folder / record)
     force = table["force [N]"]
     assert np.std(force - measured["force [N]"]) < 0.006 * np.ptp(force)
+    assert "front axial at a preload of 0 mm and 23 degC: force over" in done.text
     peak, rms, power, strain = numbers(line(done, "front axial  "))[:4]
     assert (peak, rms) == pytest.approx((abs(force).max(), np.sqrt(np.mean(force**2))), rel=1e-3)
     motion = table["displacement [mm]"]

@@ -179,7 +179,7 @@ def test_only_tested_preloads_are_predicted_also_from_the_model_file():
     result = from_document(to_document(fitted))
     stated = predict(result, Direction.AXIAL, [20.0], [1e-4], preload=Preload(300.0, "N"))
     default = predict(result, Direction.AXIAL, [20.0], [1e-4])
-    assert default.preload == Preload(300.0, "N")
+    assert default.conditions.preload == Preload(300.0, "N")
     assert default.stiffness.value == stated.stiffness.value
     refused = {
         "outside the tested range": (Direction.AXIAL, Preload(0.0, "N")),
@@ -208,7 +208,7 @@ def test_static_curves_and_comparisons_are_about_a_preload():
     assert [file.kind for file in output.files if file.name == "axial_static"] == ["table", "figure"]
     compared = compare(result, result, preload="700 N")
     (contrast,) = compared.comparisons[0].contrasts
-    assert contrast.reference.preload == contrast.other.preload == preload
+    assert contrast.reference.conditions.preload == contrast.other.conditions.preload == preload
     assert "axial at a preload of 700 N: stiffness" in compared.words[0]
     with pytest.raises(ModelError, match="outside the tested range"):
         compare(result, result, preload="1100 N")

@@ -6,7 +6,6 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from bushfit.effects.contract import Array
-from bushfit.effects.temperature import REFERENCE
 from bushfit.model.covariance import Z95
 from bushfit.model.result import Result
 from bushfit.prediction.bands import Band
@@ -48,13 +47,14 @@ def headline_texts(result: Result, prediction: Prediction) -> dict[str, str]:
     point = predict(result, place, [frequency], [amplitude])
     unit, to_unit = display_unit(name, factor, float(point.stiffness.value[0]))
     dynamic, loss = band_at(point.stiffness, 0, to_unit), band_at(point.loss_factor, 0)
-    preload = f"preload {prediction.preload.text(place)}" if prediction.preload else ""
-    temperature = f"{number(REFERENCE - CELSIUS, 3)} °C" if "temperature" in result.model.depends_on else ""
+    preload, kelvin = point.conditions.preload, point.conditions.temperature
+    conditions = [f"preload {preload.text(place)}"] if preload else []
+    conditions += [] if kelvin is None else [f"{number(float(kelvin) - CELSIUS, 3)} °C"]
     row = {
         "place": str(place),
         "frequency": f"{number(frequency, 3)} Hz",
         "amplitude": format_range(length, to_length * amplitude),
-        "conditions": ", ".join(filter(None, (preload, temperature))),
+        "conditions": ", ".join(conditions),
         "stiffness": f"{format_aligned(dynamic[:1], 4)[0]} {unit}",
         "stiffness_band": format_interval(dynamic),
         "loss_factor": format_aligned(loss[:1], 3)[0],

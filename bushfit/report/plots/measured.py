@@ -10,7 +10,6 @@ import pandas as pd
 from matplotlib.axes import Axes
 
 from bushfit.effects.contract import Array
-from bushfit.effects.temperature import REFERENCE
 from bushfit.geometry import Place
 from bushfit.model.result import Result
 from bushfit.prediction.stiffness import Prediction
@@ -131,25 +130,19 @@ def table_stiffness(rows: pd.DataFrame, place: Place, before: str = "") -> Array
     return np.asarray(magnitude * np.exp(1j * np.arctan(loss)))
 
 
-def rows_at_conditions(table: pd.DataFrame, prediction: Prediction, result: Result) -> pd.DataFrame:
+def rows_at_conditions(table: pd.DataFrame, prediction: Prediction) -> pd.DataFrame:
     """Select the measured sweeps to draw with a prediction: of the same direction, preload and temperature.
 
-    Args:
-        table: table of sweeps, in which preload and temperature may be missing.
-        prediction: prediction of one direction or specimen.
-        result: predicted model; the temperature is ignored if the model does not depend on it.
-
-    Returns:
-        Rows of the table.
+    The table may lack preload and temperature. The temperature is ignored if the model does not depend on it.
     """
     rows = table[table["direction"] == str(prediction.direction)].rename(columns={"sweep": "test"})
-    value, unit = prediction.preload.in_display_unit(prediction.direction) if prediction.preload else (0.0, "")
+    preload, kelvin = prediction.conditions.preload, prediction.conditions.temperature
+    value, unit = preload.in_display_unit(prediction.direction) if preload else (0.0, "")
     if (header := f"preload [{unit}]") in rows:
         rows = rows[~((rows[header] - value).abs() > SAME_PRELOAD * max(abs(value), rows[header].abs().max()))]
-    if "temperature [degC]" in rows and "temperature" in result.model.depends_on:
+    if "temperature [degC]" in rows and kelvin is not None:
         degrees = rows.groupby("test")["temperature [degC]"].transform("mean")
-        wanted = (prediction.temperature or REFERENCE) - CELSIUS
-        rows = rows[~((degrees - wanted).abs() > SAME_TEMPERATURE)]
+        rows = rows[~((degrees - (kelvin - CELSIUS)).abs() > SAME_TEMPERATURE)]
     return rows
 
 

@@ -65,10 +65,10 @@ def prediction_figure(
             values if values.size < 2 else np.union1d(values, np.geomspace(values[0], values[-1], _FINE))
             for values in (frequencies, amplitudes)
         ]
-        conditions: Any = {"temperature": prediction.temperature, "preload": prediction.preload}
+        conditions: Any = {key: getattr(prediction.conditions, key) for key in ("temperature", "preload")}
         refined = partial(predict, result, place, *fine_axes, **conditions)
         fine, rig = refined(), refined(rig=True) if rig_effects(result) else None
-    of_place = None if table is None else rows_at_conditions(table, prediction, result)
+    of_place = None if table is None else rows_at_conditions(table, prediction)
     groups = [] if of_place is None or of_place.empty else sweep_groups(of_place, result)
     free = [group.thinned() for group in groups if group.palette == "loop" and np.isnan(group.curves[0].level)]
     rows = [curve.rows for group in groups for curve in group.curves if not np.isnan(curve.level)]
@@ -122,9 +122,10 @@ def static_figure(curves: Sequence[StaticCurve], title: str) -> style.Chart:
             panels[0].plot(x, factor * line.value, color=look.color, lw=_THIN)
         for axes, band, scale in zip(panels, (one.mean, one.slope), (factor, slope_factor), strict=True):
             style.draw_band(axes, x, scale * band.ends, look, lw=_LINE)
+    preloads = [one.conditions.preload for one in curves]
     if len(curves) > 1:
         handles = [look.handle(False) for look in style.styles(len(curves), "loop")]
-        style.legend(panels[1], handles, [one.preload.text(place) for one in curves if one.preload], "preload")
+        style.legend(panels[1], handles, [load.text(place) for load in preloads if load], "preload")
     style.label_axes(panels[0], displacement_header(place), f"{quantity_words(place)[1]} [{unit}]")
     style.label_axes(panels[1], displacement_header(place), f"static {quantity_words(place)[2]} [{slope_unit}]")
     panels[1].set_ylim(bottom=0.0)

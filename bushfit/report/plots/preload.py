@@ -1,6 +1,7 @@
 """Figure of predictions over the preload."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -30,13 +31,14 @@ def preload_figure(result: Result, predictions: Sequence[Prediction], title: str
     Returns:
         Figure with a line and a 95 % band for at most six amplitudes, and points at measured preloads.
     """
-    place, preloads = predictions[0].direction, [prediction.preload for prediction in predictions if prediction.preload]
+    place, conditions = predictions[0].direction, [prediction.conditions for prediction in predictions]
+    preloads = [condition.preload for condition in conditions if condition.preload]
     frequencies, amplitudes = np.unique(predictions[0].frequency), np.unique(predictions[0].amplitude)
     frequency = frequencies[frequencies.size // 2]
     amplitudes = amplitudes[spread_indices(amplitudes.size, _MOST_LEVELS)]
     ends = min(preloads).value, max(preloads).value
     loads = [Preload(value, preloads[0].unit) for value in np.linspace(*ends, _FINE).tolist()]
-    temperature = predictions[0].temperature
+    temperature: Any = conditions[0].temperature
     fine = [predict(result, place, [frequency], amplitudes, temperature=temperature, preload=load) for load in loads]
     figure = style.Chart(title, style.ROW)
     panels, unit = figure.subplots(1, 2), preloads[0].in_display_unit(place)[1]
