@@ -55,7 +55,7 @@ def to_files(simulated: Simulated, form: Form = "csv") -> dict[str, bytes]:
         Path(__file__).with_name("campaign.toml.jinja"),
         plan=simulated.plan,
         laws=sorted({Path(origin.file).resolve().as_posix() for origin in origins if origin.file}),
-        body=body_lines(simulated.truth.bushing, simulated.specimens),
+        body=body_lines(simulated.truth, simulated.specimens),
         tests=[(kind, getattr(simulated, kind)) for kind in ("loops", "sweeps", "validation")],
         resonances=simulated.resonances,
         directions=list(Direction),

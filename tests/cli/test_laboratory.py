@@ -3,6 +3,7 @@
 import json
 import re
 import shlex
+import tomllib
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -287,6 +288,7 @@ def test_a_resonance_test_is_reduced_to_the_stiffness_of_the_specimen(lab):
     """The command that simulate writes into its campaign."""
     folder, _ = lab(*FIT)
     text = (folder / "sim/campaign.toml").read_text(encoding="utf-8")
+    assert [body.get("factor") for body in tomllib.loads(text)["bushings"]] == [None, "free"]
     (*_, last) = re.findall(r"^# bushfit (reduce .*)$", text, re.MULTILINE)
     command = shlex.split(last)
     command[1] = f"sim/{command[1]}"
