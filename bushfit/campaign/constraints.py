@@ -100,7 +100,7 @@ def _from_result(
     """
     sources = [loop.source for loop in campaign.loops] + [sweep.source for sweep in campaign.sweeps]
     hashes = {source.sha256 for source in sources if source}
-    if twice := [str(source.file) for source in result.inputs if source.sha256 in hashes]:
+    if twice := [file for file, sha256 in result.files.items() if sha256 in hashes]:
         expected = "a model fitted to other tests: a test that is used twice makes intervals too narrow"
         raise CampaignError("the prior was fitted to tests of this campaign", found=", ".join(twice), expected=expected)
     names = [name for name in result.fitted if name not in result.at_bound and name not in without]

@@ -106,8 +106,8 @@ def print_origin(output: Output, result: Result) -> None:
     """Print the equation of a model and its input files; nothing without -v."""
     if output.verbose:
         output.print(result.model.equation())
-        for source in result.inputs:
-            output.print(f"input: {source.file} sha256 {source.sha256[:12]}")
+        for file, sha256 in result.files.items():
+            output.print(f"input: {file} sha256 {sha256[:12]}")
 
 
 def print_parameters(output: Output, title: str, result: Result) -> None:

@@ -96,9 +96,10 @@ class PredictionOutput:
 
     @cached_property
     def measured_by_fit(self) -> tuple[list[MeasuredSweep], list[MeasuredSweep]]:
-        """Measured sweeps to which the model was fitted, by the hashes of their files, and the others."""
-        digests = {source.sha256 for source in self.result.inputs}
-        fitted = [sweep for sweep in self.measured if sweep.source and sweep.source.sha256 in digests]
+        """Measured sweeps to which the model was fitted, by directions and hashes of files, and the others."""
+        digests, measured = self.result.files.values(), self.result.measured
+        of_files = [sweep for sweep in self.measured if sweep.source and sweep.source.sha256 in digests]
+        fitted = [sweep for sweep in of_files if measured and str(sweep.direction) in measured.directions]
         return fitted, [sweep for sweep in self.measured if sweep not in fitted]
 
     @cached_property

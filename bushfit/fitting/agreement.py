@@ -224,13 +224,14 @@ def prior_uses(solution: FitResult, covariance: Covariance) -> dict[str, PriorUs
         covariance: covariance of the fitted parameters.
 
     Returns:
-        By name of the parameter, the share of the information that comes from the prior, and the distance between the
-        tests and the prior in standard deviations.
+        By name of the parameter, the share of the information (1/variance) that comes from the prior, and the distance
+        between the tests and the prior in standard deviations.
 
     Notes:
         Let S be the variance of the prior, V that of the estimate, and v that of the estimate if the weights of the fit
-        are right. Then v/S is the weight of the prior. If prior and tests agree, the estimate differs from the mean of
-        the prior with the variance V + S - 2 v, which is S - v for right weights.
+        are right. Then w = v/S is the weight of the prior. The tests alone have the variance T with V = w^2 S + (1 -
+        w)^2 T, and the share of the prior is T/(S + T), which is w for right weights. If prior and tests agree, the
+        estimate differs from the mean of the prior with the variance V + S - 2 v, which is S - v for right weights.
     """
     moving, model = solution.inner_indices, solution.model
     names, uses = [solution.names[i] for i in moving], dict[str, PriorUse]()
@@ -250,10 +251,12 @@ def prior_uses(solution: FitResult, covariance: Covariance) -> dict[str, PriorUs
         errors = np.array([covariance.stderr(name) for name in uncertain]) / coordinates.slopes(model.values)
         spread = np.sqrt(np.maximum(np.square(errors) + before - 2.0 * after, np.finfo(float).tiny))
         for i, name in enumerate(uncertain):
-            share = float(after[i] / before[i])
             if np.any(changes[:, i]):
-                distance = float(distances[i] / spread[i]) if share < _ALL else 0.0
-                uses[name] = PriorUse(prior.source, mean[name], deviation[name], min(share, 1.0), distance)
+                share, distance = min(float(after[i] / before[i]), 1.0), 0.0
+                if share < _ALL:
+                    tests = max(errors[i] ** 2 - share**2 * before[i], 0.0) / (1.0 - share) ** 2
+                    share, distance = float(tests / (before[i] + tests)), float(distances[i] / spread[i])
+                uses[name] = PriorUse(prior.source, mean[name], deviation[name], share, distance)
     return uses
 
 

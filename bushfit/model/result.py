@@ -330,6 +330,11 @@ class Result:
         return " and ".join(bushing.name for bushing in self.bushings) or self.specimens[0].name
 
     @property
+    def files(self) -> dict[str, str]:
+        """SHA-256 of each test file, by its path; a file with several tests is listed once."""
+        return {str(source.file): source.sha256 for source in self.inputs}
+
+    @property
     def bushings(self) -> list[Bushing]:
         """Bushings of the compound, if several were tested."""
         return [*dict.fromkeys(specimen.bushing for specimen in self.specimens if specimen.bushing)]

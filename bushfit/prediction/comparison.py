@@ -185,8 +185,7 @@ def compare(
     for one, two in zip(*sides, strict=True):
         stiffness = two.stiffness.logarithm().minus(one.stiffness.logarithm())
         contrasts.append(Contrast(one, two, stiffness, two.loss_factor.minus(one.loss_factor)))
-    files = {source.sha256 for source in compared.inputs}
-    shared = tuple(str(source.file) for source in reference.inputs if source.sha256 in files)
+    shared = tuple(file for file, sha256 in reference.files.items() if sha256 in compared.files.values())
     return Comparison(parameters, joint, tuple(contrasts), shared)
 
 

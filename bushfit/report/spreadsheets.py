@@ -76,8 +76,8 @@ def _provenance_rows(request: ExportRequest) -> Iterator[tuple[str, str]]:
     yield "effects", ", ".join(result.model.effects)
     yield "model", str(request.source.file)
     yield "model, sha256", request.source.sha256
-    for source in result.inputs:
-        yield "test", str(source.file)
-        yield "test, sha256", source.sha256
+    for file, sha256 in result.files.items():
+        yield "test", file
+        yield "test, sha256", sha256
     yield "bushfit", __version__
     yield from request.remarks([NO_LOOPS])

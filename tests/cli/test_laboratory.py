@@ -102,6 +102,7 @@ def test_parameters_meet_the_truth_and_are_the_same_in_all_files(lab):
     saved = json.loads((folder / "fit/model.json").read_text(encoding="utf-8"))
     assert printed == saved["parameters"]
     record = "sim/loop_rear left axial_2.csv"
+    assert re.findall("^input: (.*) sha256", done.text, re.MULTILINE).count("front.csv") == 1, "of three sweeps"
     assert [entry["file"] for entry in saved["provenance"]["inputs"]].count(record) == 1, "of two loops"
     covariance = dict(zip(saved["covariance"]["names"], np.diag(saved["covariance"]["matrix"]), strict=True))
     known = {**vars(RUBBER), **EFFECTS}

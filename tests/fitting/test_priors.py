@@ -10,6 +10,7 @@ from fits import joint_fit
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import ParameterSetting, RigSettings
 from bushfit.errors import BushfitError
+from bushfit.fitting.agreement import prior_uses
 from bushfit.fitting.assess import covariance
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.problem import FitProblem
@@ -35,8 +36,11 @@ def test_a_prior_weighs_as_one_more_measurement_of_the_parameter(measured, paper
     assert fitted.model.values["alpha"] == pytest.approx(value + error, rel=0.02 * error / value)
     assert fitted.chi_square - plain.chi_square == pytest.approx(2.0, rel=0.05)
     stage = [FitProblem(plain.model, tests, FIVE)]
-    before, after = (covariance(fit.model, stage).stderr("alpha") or 0.0 for fit in (plain, fitted))
+    covariances = [covariance(fit.model, stage) for fit in (plain, fitted)]
+    before, after = (known.stderr("alpha") or 0.0 for known in covariances)
     assert after == pytest.approx(np.hypot(before, error) / 2.0, rel=0.03)
+    share = prior_uses(fitted, covariances[1])["alpha"].share
+    assert share == pytest.approx(before**2 / (before**2 + error**2), rel=0.03)
 
 
 def _fitted(campaign: Campaign, **settings: ParameterSetting) -> Result:

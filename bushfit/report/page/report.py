@@ -91,7 +91,7 @@ def report_page(files: Sequence[ResultFile], date: str | None = None, folder: Pa
     pictures, left_out = draw_figures(result, diagnosis, tested, by_name, charts)
     sizes = [p.stiffness.value for p in predictions if p.direction.motion is TRANSLATION]
     ends = [20.0 * math.log10(end) for end in (min(map(np.min, sizes)), max(map(np.max, sizes)))] if sizes else []
-    sources: list[Any] = [*([campaign] if campaign else []), *tests, *result.inputs]
+    sources: list[Any] = [*([campaign] if campaign else []), *tests]
     context = {
         "result": result,
         "campaign": campaign,
@@ -114,7 +114,7 @@ def report_page(files: Sequence[ResultFile], date: str | None = None, folder: Pa
         "more_tests": max(0, len(tests) - MOST),
         "tabled": [*value_rows(predictions)],
         "warnings": group_warnings(warnings),
-        "files": list(dict.fromkeys((str(one.file), one.sha256) for one in sources if one.file and one.sha256)),
+        "files": ({str(one.file): one.sha256 for one in sources if one.file and one.sha256} | result.files).items(),
         "levels": " to ".join(dict.fromkeys(f"{end:.1f}" for end in ends)),
         "moduli": any(prediction.direction.motion is STRAINING for prediction in predictions),
     }
