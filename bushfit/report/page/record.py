@@ -106,7 +106,7 @@ def read_results(folder: Path) -> list[ResultFile]:
     paths = {name: folder / f"{name}.json" for name in (*MODELS, JOINT, "diagnosis")}
     documents = {name: read_document(path) for name, path in paths.items() if path.exists()}
     model = next(name for name in MODELS if name in documents)
-    records = sorted({path.stem for path in folder.glob("validation_*") if path.suffix in (".csv", ".xlsx")})
+    records = sorted({path.stem for path in folder.glob("validation*") if path.suffix in (".csv", ".xlsx")})
     places = [*Direction, *from_document(documents[model], paths[model]).specimens]
     tables = {name: read_table(folder, name) for name in ("loops", "sweeps", "gap", *records, *place_names(places))}
     files = [ResultFile(name, "json", document) for name, document in documents.items()]

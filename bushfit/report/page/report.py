@@ -109,6 +109,7 @@ def report_page(files: Sequence[ResultFile], date: str | None = None, folder: Pa
         "plain": {row.name: row.value for row in parameter_rows(plain)} if is_extended else {},
         "correlations": correlation_texts(result),
         "tests": tests[:MOST],
+        "validation": tables.get("validation"),
         "agreement": {misfit.test: misfit for misfit in result.tests if misfit.held is None},
         "displays": DISPLAYS,
         "more_tests": max(0, len(tests) - MOST),
