@@ -38,12 +38,20 @@ __all__ = list(_MODULES)
 
 
 def __getattr__(name: str) -> Any:
-    """Import a public function when it is first used, because importing all of them takes a second."""
+    """Import a public function when it is first used, because importing all of them takes a second.
+
+    While the function runs, linear algebra uses one thread, as in the commands: several threads take several times as
+    long for small matrices.
+    """
     if name not in _MODULES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from importlib import import_module
 
-    return getattr(import_module(f"bushfit.{_MODULES[name]}"), name)
+    from threadpoolctl import threadpool_limits
+
+    function = threadpool_limits.wrap(limits=1)(getattr(import_module(f"bushfit.{_MODULES[name]}"), name))
+    function.__module__ = __name__  # where pickle finds it
+    return globals().setdefault(name, function)
 
 
 def __dir__() -> list[str]:

@@ -207,7 +207,7 @@ def model_of(campaign: Campaign) -> Model:
         campaign: campaign with a [simulate] table.
 
     Returns:
-        Model with the parameters and effects of the [simulate] table, and the free factor of each of several bushings.
+        Model with the parameters and effects of the [simulate] table.
 
     Raises:
         CampaignError: no [simulate] table, or one of the paper's five parameters without a value.
@@ -237,12 +237,7 @@ def model_of(campaign: Campaign) -> Model:
     with error_location(campaign.path):
         names = with_base(dict.fromkeys(map(effect_name_of, effect_parameters)))
         used = {name: value for name, value in values.items() if effect_name_of(name) in names}
-        model = Model(campaign.bushing, names, {**used, **effect_parameters})
-    bodies = dict.fromkeys(place.body for place in campaign.specimens if place.bushing)
-    free = [name for name in map("stiffness_factor.{}".format, bodies) if name in campaign.fit.effects]
-    for name in (name for name in free if name not in names):  # its factor is one
-        model = model.with_effect(name)
-    return model
+        return Model(campaign.bushing, names, {**used, **effect_parameters})
 
 
 def refuse_tests(paths: Sequence[Path]) -> None:

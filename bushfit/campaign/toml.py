@@ -8,7 +8,6 @@ from typing import Any
 
 from bushfit.errors import CONTROL, CampaignError
 from bushfit.geometry import Bushing, Place, Specimen
-from bushfit.model.model import Model
 from bushfit.reading.files import line_of, read_utf8
 from bushfit.reading.preload import Preload
 from bushfit.units import CELSIUS
@@ -66,22 +65,23 @@ def parse_toml(path: Path, description: str = "a campaign file", largest: int = 
     raise CampaignError("the tables are nested too deeply", file=path, place=place, expected=expected)
 
 
-def body_lines(model: Model, specimens: Collection[Specimen]) -> list[str]:
+def body_lines(bushing: Bushing | None, specimens: Collection[Specimen], effects: Collection[str]) -> list[str]:
     """Write the tables [bushing], [[bushings]] and [[specimens]] of a campaign file.
 
     Args:
-        model: model of the bushing, or of several bushings; those with a stiffness factor have `factor = "free"`.
+        bushing: the bushing; None for several bushings, or for specimens only.
         specimens: bodies of the same compound.
+        effects: effects of a fit; a bushing that has a stiffness factor among them has `factor = "free"`.
 
     Returns:
         Lines of TOML.
     """
     lines = []
-    if model.bushing:
-        lines += ["[bushing]", *_bushing_lines(model.bushing)]
+    if bushing:
+        lines += ["[bushing]", *_bushing_lines(bushing)]
     for tube in dict.fromkeys(specimen.bushing for specimen in specimens if specimen.bushing):
         lines += ["", "[[bushings]]", *_bushing_lines(tube)]
-        lines += ['factor = "free"'] if f"stiffness_factor.{tube.name}" in model.effects else []
+        lines += ['factor = "free"'] if f"stiffness_factor.{tube.name}" in effects else []
     for specimen in specimens:
         lines += [] if specimen.bushing else ["", *specimen_lines(specimen)]
     return lines

@@ -57,12 +57,12 @@ def command(source: Path, effects: tuple[str, ...], output: Output, **settings: 
     from bushfit.commands.simulate import simulate_campaign, simulated_tests
 
     is_model = source.suffix.lower() == ".json" or source.is_dir()
-    truth, tests = simulated_tests(load_model(source) if is_model else load_campaign(source))
+    truth, tests, fitted = simulated_tests(load_model(source) if is_model else load_campaign(source))
     changes = {name: value for name, value in settings.items() if value is not None}
     for text in effects:
         truth = _with_effect(truth, text)
     with error_location(source):
-        result, document, files = simulate_campaign(truth, replace(tests, **changes), output.formats.table_form)
+        result, document, files = simulate_campaign(truth, replace(tests, **changes), fitted, output.formats.table_form)
     if truth.unnamed:
         sentence = "the unnamed correction is left out, because it applies only to steady states, not in time"
         output.warn([Caveat("correction_not_simulated", sentence)])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -20,29 +21,33 @@ from bushfit.simulation.measured import simulate as simulate_tests
 
 
 def simulate_campaign(
-    truth: Model, settings: SimulateSettings, form: Form = "csv"
+    truth: Model, settings: SimulateSettings, effects: Collection[str], form: Form = "csv"
 ) -> tuple[Result, dict[str, Any], list[ResultFile]]:
     """Simulate the tests of a campaign.
 
     Args:
         truth: the true model; a smooth correction in it is left out, because it has no law in time.
         settings: tests, noise and errors of the rig.
+        effects: effects that a fit of the tests has.
         form: format of the tables.
 
     Returns:
         The model that was simulated; content of `simulate --json`; and campaign file, tables and truth.json.
     """
     simulated = simulate_tests(truth.without(UNNAMED), settings)
-    contents = to_files(simulated, form)
+    contents = to_files(simulated, form, effects)
     document = {"truth": to_document(simulated.result), "files": sorted(contents)}
     return simulated.result, document, [ResultFile(name, "raw", content) for name, content in contents.items()]
 
 
-def simulated_tests(source: Model | Result | HasResult | Campaign) -> tuple[Model, SimulateSettings]:
-    """Model to simulate, and its tests: from the [simulate] table of a campaign, or else the tests of the paper."""
+def simulated_tests(
+    source: Model | Result | HasResult | Campaign,
+) -> tuple[Model, SimulateSettings, Collection[str]]:
+    """Model to simulate, its tests (of the paper, unless a campaign states others), and effects that a fit has."""
     if isinstance(source, Campaign):
-        return model_of(source), source.simulate or SimulateSettings()
-    return source if isinstance(source, Model) else as_result(source).model, SimulateSettings()
+        return model_of(source), source.simulate or SimulateSettings(), source.fit.effects
+    model = source if isinstance(source, Model) else as_result(source).model
+    return model, SimulateSettings(), model.effects
 
 
 def simulate(
@@ -63,8 +68,8 @@ def simulate(
     Raises:
         BushfitError: the source has no model, or files would be replaced.
     """
-    truth, tests = simulated_tests(source)
-    _, _, files = simulate_campaign(truth, replace(tests, **settings))
+    truth, tests, effects = simulated_tests(source)
+    _, _, files = simulate_campaign(truth, replace(tests, **settings), effects)
     inputs = [source.path] if isinstance(source, Campaign) else []
     write_results(Path(folder), files, overwrite=force, inputs=inputs)
     return load_campaign(Path(folder) / "campaign.toml")

@@ -56,7 +56,7 @@ def campaign_toml(knowledge: Knowledge, planned: Sequence[Test]) -> str:
     specimens = dict.fromkeys(test.direction for test in planned if isinstance(test.direction, Specimen))
     return render_template(
         Path(__file__).with_name("campaign.toml.jinja"),
-        body=body_lines(knowledge.model, specimens),
+        body=body_lines(knowledge.model.bushing, specimens, knowledge.model.effects),
         settings=simulation_settings(planned, knowledge.noise),
         model=knowledge.model,
         base=BASE,

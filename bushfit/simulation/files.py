@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Collection
 from pathlib import Path
 
 import numpy as np
@@ -34,12 +35,13 @@ class SimulationDocument(TypedDict):
     files: list[str]
 
 
-def to_files(simulated: Simulated, form: Form = "csv") -> dict[str, bytes]:
+def to_files(simulated: Simulated, form: Form = "csv", effects: Collection[str] = ()) -> dict[str, bytes]:
     """Convert a simulated campaign to the files of a laboratory.
 
     Args:
         simulated: simulated campaign.
         form: file format of the tables.
+        effects: effects that a fit of the tests has, as of `body_lines`.
 
     Returns:
         Content by file name: tables of the tests, `campaign.toml`, and the true model in `truth.json`. Comments in
@@ -55,7 +57,7 @@ def to_files(simulated: Simulated, form: Form = "csv") -> dict[str, bytes]:
         Path(__file__).with_name("campaign.toml.jinja"),
         plan=simulated.plan,
         laws=sorted({Path(origin.file).resolve().as_posix() for origin in origins if origin.file}),
-        body=body_lines(simulated.truth, simulated.specimens),
+        body=body_lines(simulated.truth.bushing, simulated.specimens, effects),
         tests=[(kind, getattr(simulated, kind)) for kind in ("loops", "sweeps", "validation")],
         resonances=simulated.resonances,
         directions=list(Direction),

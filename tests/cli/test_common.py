@@ -4,6 +4,7 @@ import contextlib
 import io
 import json
 import os
+import pickle
 import re
 import shlex
 import shutil
@@ -18,7 +19,9 @@ import pytest
 from click.testing import CliRunner
 from shell import CAMPAIGN, GEOMETRY, names, values
 from spoiled import FILES, MODEL
+from threadpoolctl import threadpool_info, threadpool_limits
 
+import bushfit as package
 from bushfit.cli import cli, main
 from bushfit.cli import output as common
 
@@ -286,3 +289,16 @@ def test_the_example_runs_and_gives_back_its_parameters(bushfit, table_1, tmp_pa
     assert "Simulated by bushfit simulate" in (tmp_path / "my example/campaign.toml").read_text(encoding="utf-8")
     fitted = values(bushfit("fit", tmp_path / "my example/campaign.toml", "-o", tmp_path / "f", "--no-plots", "--json"))
     assert fitted == pytest.approx(table_1, rel=0.05)
+
+
+def test_a_function_of_the_library_uses_one_thread_and_can_be_pickled(monkeypatch):
+    def threads() -> set[int]:
+        return {pool["num_threads"] for pool in threadpool_info()}
+
+    monkeypatch.setattr("bushfit.commands.loading.load_model", threads)
+    monkeypatch.delitem(vars(package), "load_model", raising=False)
+    with threadpool_limits(2):
+        assert package.load_model() == {1}
+        assert threads() == {2}
+    monkeypatch.delitem(vars(package), "load_model")
+    assert pickle.loads(pickle.dumps(package.fit)) is package.fit
