@@ -71,9 +71,8 @@ class _Console(Console):
 
     def __init__(self, *, stderr: bool, quiet: bool) -> None:
         super().__init__(stderr=stderr, quiet=quiet, highlight=False, soft_wrap=True, emoji=False)
-        if not self.is_terminal:
-            columns = os.environ.get("COLUMNS", "")
-            self.width = int(columns) if columns.isdecimal() else _WIDTH
+        if not self.is_terminal and "COLUMNS" not in os.environ:  # which rich reads
+            self.width = _WIDTH
 
     def print(self, *objects: Any, **options: Any) -> None:
         """Print objects of rich; a text that cannot be written, as to a full disk, is an error at the end only."""
