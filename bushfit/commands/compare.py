@@ -1,7 +1,7 @@
 """compare: several results compared with the first, or model families on one campaign."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from functools import partial
 from string import ascii_uppercase
 from typing import Any, Unpack
@@ -17,7 +17,7 @@ from bushfit.diagnosis.families import FittedFamily
 from bushfit.errors import BushfitError, ModelError
 from bushfit.geometry import Place, default_places, get_places
 from bushfit.model.document import BushingTable
-from bushfit.model.file import to_document, versions
+from bushfit.model.file import versions
 from bushfit.model.result import Result
 from bushfit.prediction.caveats import warnings_of
 from bushfit.prediction.comparison import Comparison, with_holm
@@ -266,13 +266,13 @@ def _common_places(results: Sequence[Result], names: Sequence[str] | None) -> li
 
 def _entry(label: str, entry: ComparedResult) -> ComparedEntry:
     """Make the entry of a compared result in compare.json; the label, a letter, stands for it in tables."""
-    result, bushing = entry.result, to_document(Result(entry.result.model))["bushing"]
+    result, bushing = entry.result, entry.result.model.bushing
     return ComparedEntry(
         label,
         entry.name,
         entry.source,
         entry.sha256,
-        BushingTable(**bushing) if bushing else None,
+        BushingTable(*astuple(bushing)) if bushing else None,
         list(result.model.effects),
         result.quality.reduced_chi_square if result.quality else None,
         result.quality.nrmse if result.quality else None,

@@ -16,7 +16,6 @@ from bushfit.diagnosis.document import DiagnosisFile
 from bushfit.diagnosis.record import format_odds
 from bushfit.errors import ModelError
 from bushfit.geometry import STRAINING, TRANSLATION
-from bushfit.model.document import CampaignTable
 from bushfit.model.file import from_document, require_schema
 from bushfit.model.result import Result
 from bushfit.prediction.caveats import agrees_within_noise, warnings_of
@@ -73,9 +72,7 @@ def report_page(files: Sequence[ResultFile], date: str | None = None, folder: Pa
     result, joint = from_document(model, paths.get(name)), documents.get(JOINT)
     plain = from_document(joint, paths.get(JOINT)) if joint else result
     is_extended = plain.model.effects != result.model.effects  # else joint.json is of an earlier run
-    campaign, diagnosis = model.get("campaign") or None, documents.get("diagnosis")
-    if campaign:
-        campaign = validate_tables(campaign, paths.get(name), CampaignTable, "campaign", kind=ModelError)
+    campaign, diagnosis = result.campaign, documents.get("diagnosis")
     if diagnosis:
         file, hint = paths.get("diagnosis"), "bushfit diagnose writes it again"
         require_schema(diagnosis, file, "a diagnosis", DIAGNOSIS, hint=hint)
