@@ -47,8 +47,6 @@ _SYMBOLS = {"f": "frequency", "a": "amplitude", "x": "amplitude", "s": "amplitud
 _MOST_COLUMNS = 200
 #: Words and marks without a meaning that join a level to a quantity in a header.
 _JOINTS = re.compile(r"[\[(]\s*(?:at|bei)?\s*[\])]|(?<!\w)(?:at|bei|für|for|à|a|@|:|,|;|=|-)(?!\w)")
-#: Largest number of characters of a header; chosen: longer texts are not headers.
-_LONGEST_HEADER = 200
 #: Level that may have a thousands separator: 1,250.
 _GROUPED = re.compile(r"[1-9]\d{0,2}[.,]\d{3}")
 #: Separator of the two roles in the top left cell of a block: "f [Hz] \ A [mm]".
