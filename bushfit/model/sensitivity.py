@@ -14,7 +14,7 @@ from bushfit.effects import place_suffix
 from bushfit.effects.contract import UNKNOWN, Array, RubberConditions, Values
 from bushfit.effects.history import History
 from bushfit.geometry import Place, Specimen
-from bushfit.model.model import Kind, Model
+from bushfit.model.model import Model
 
 #: Step of the differences, relative to the value (log parameters) or to the typical distance (linear parameters);
 #: chosen: the differences are good to about a millionth.
@@ -27,10 +27,9 @@ def stiffness_and_slopes(
     frequency: Array,
     amplitude: Array,
     names: Sequence[str],
-    kind: Kind = "sweep",
     conditions: RubberConditions = UNKNOWN,
 ) -> tuple[Array, Array]:
-    """Complex dynamic stiffness of a model and its derivatives with respect to parameters, for the Jacobian of a fit.
+    """Complex dynamic stiffness of a model in a sweep and its derivatives with respect to parameters.
 
     Args:
         model: model; the derivatives are taken at its parameter values.
@@ -38,7 +37,6 @@ def stiffness_and_slopes(
         frequency: frequency [Hz], (n,).
         amplitude: zero-to-peak amplitude [m or rad], (n,).
         names: names of k parameters.
-        kind: kind of test, "loop" or "sweep".
         conditions: temperature and history of the rubber at the points.
 
     Returns:
@@ -50,7 +48,7 @@ def stiffness_and_slopes(
     array([[0.3634+0.j]])
     """
     values, steps = stepped_values(model, names, direction)
-    stack = model.stack(direction, kind, conditions, values)
+    stack = model.stack(direction, "sweep", conditions, values)
     return difference_quotients(stack(2.0 * np.pi * frequency, amplitude), steps)
 
 
