@@ -199,7 +199,7 @@ class InputTable:
 
     file: str
     sha256: str
-    conditions: Mapping[str, str | Number] = field(default_factory=dict)
+    conditions: Mapping[str, str | WholeNumber | Number] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -228,7 +228,7 @@ class TestTable:
     stepped: Stepped | None = None
     file: str | None = None
     sha256: str | None = None
-    conditions: Mapping[str, str | Number] = field(default_factory=dict)
+    conditions: Mapping[str, str | WholeNumber | Number] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

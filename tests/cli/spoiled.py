@@ -21,6 +21,7 @@ EXPORT = ("export", "model.json", *(f"--format={name}" for name in ("nastran", "
 class Spoiled:
     """One spoiled input: a command line, the files that differ from FILES (None: not there), and what to say."""
 
+    table: str
     name: str
     command: tuple[str, ...]
     says: tuple[str, ...]
@@ -66,13 +67,13 @@ def listed() -> Iterator[Spoiled]:
             elif "file" in row:
                 assert row["old"] in FILES[row["file"]], row
                 files[row["file"]] = FILES[row["file"]].replace(row["old"], row["new"], 1)
-            yield Spoiled(name, tuple(row["command"].split("|")), tuple(row["says"]), files)
+            yield Spoiled(table.stem, name, tuple(row["command"].split("|")), tuple(row["says"]), files)
             if table.stem == "models":
-                yield Spoiled(f"export: {name}", EXPORT, tuple(row["says"]), files)
+                yield Spoiled("models_to_export", f"export: {name}", EXPORT, tuple(row["says"]), files)
 
 
 ROWS = [
     *listed(),
-    *(Spoiled(name, (command, file if file != "loop.csv" else "campaign.toml"), tuple(says), {file: content})
+    *(Spoiled("unwritten", name, (command, file if file != "loop.csv" else "campaign.toml"), tuple(says), {file: content})
       for name, command, file, content, says in UNWRITTEN),
 ]  # fmt: skip

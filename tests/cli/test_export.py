@@ -5,24 +5,19 @@ import re
 import shlex
 import shutil
 import zipfile
-from datetime import UTC, datetime
 from functools import partial
 from html import unescape
 from itertools import cycle
 from pathlib import Path
 
 import click
-import numpy as np
 import pandas as pd
 import pytest
 from commandline import Done, typing
-from shell import document, names, refused
+from shell import document
 from tries import some
 
 from bushfit.cli import cli
-from bushfit.effects.contract import RubberConditions
-from bushfit.model.file import load_result
-from bushfit.units import CELSIUS
 
 CONTEXT = click.Context(cli)
 READ = {
@@ -54,8 +49,6 @@ UNDRAWN = ("simulate", "example", "plan", "export")
 COMMANDS = some([*zip(ARGUMENTS, cycle(("xlsx", "decimal-comma")), strict=False)], [("reduce", "xlsx")])
 #: What a fit may have said: longer than a comment of a deck, with signs that mean something to CSV, HTML and XML.
 ODD = 'sweep_axial: "5 < 7 & 9", |K| of 3 points, ' + "far from the others, " * 5 + "left out of the fit"
-#: Options of every format that is written without a compiler.
-ALL = [f"--format={name}" for name in ("nastran", "abaqus", "adams", "csv", "xlsx", "prony")]
 
 
 @pytest.fixture(scope="module")
@@ -110,21 +103,6 @@ def test_a_variable_of_the_environment_holds_for_all_commands(place, monkeypatch
     done = typing(place)("reduce", *ARGUMENTS["reduce"], "-o", "none", status=2)
     assert "BUSHFIT_TABLE_FORMAT" in done.stderr
     assert not (place / "none").exists()
-
-
-@pytest.mark.parametrize("form", READ)
-def test_a_wide_table_is_read_back(place, form):
-    options = ("--direction", "axial", "--amplitudes", "0.1, 0.25 mm", "--no-plots", "--table-format", form)
-    typing(place)("predict", "model.json", "--wide", "-o", f"wide-{form}", *options)
-    end = "xlsx" if form == "xlsx" else "csv"
-    long, wide = (READ[form](place / f"wide-{form}/axial{name}.{end}") for name in ("", "_wide"))
-    for amplitude in (0.1, 0.25):
-        of_level = long[long["amplitude [mm]"] == amplitude]
-        assert wide["frequency [Hz]"].tolist() == of_level["frequency [Hz]"].tolist()
-        assert wide[f"stiffness {amplitude} mm [N/mm]"].tolist() == of_level["stiffness [N/mm]"].tolist()
-        assert wide[f"loss factor {amplitude} mm [-]"].tolist() == of_level["loss factor [-]"].tolist()
-    seen = typing(place)("inspect", f"wide-{form}/axial_wide.{end}", "--no-plots")
-    assert "amplitudes: 0.1, 0.25 mm" in seen.stderr
 
 
 PAPER = (
@@ -211,89 +189,3 @@ def test_every_export_says_what_predict_says(ran, model, bushfit, tmp_path):
     for file in (*files, tmp_path / "x/provenance.csv"):
         text = " ".join(text_of(file).split())
         assert [line for line in told if line not in text] == [], file.name
-
-
-def test_every_format_at_once_and_what_it_leaves_out(bushfit, tmp_path):
-    done = bushfit("export", "model/model.json", *ALL, "-o", tmp_path / "x", "--json", "-v")
-    found = json.loads(done.stdout)
-    assert names(tmp_path / "x") == {file for each in found["formats"].values() for file in each["files"]}
-    for line in {line for each in found["formats"].values() for line in each["left_out"]}:
-        of_line = ", ".join(name for name, each in found["formats"].items() if line in each["left_out"])
-        assert done.stderr.count(f"limit of {of_line}: {line}\n") == 1
-    for words in (
-        "axial: each property has one amplitude. The property of 0.2 mm has errors of ",
-        "axial: the 95 % band of up to ",
-        "no law in time",
-        "no stiffness in torsion, rotations about x and y",
-    ):
-        assert any(words in line for line in found["formats"]["nastran"]["left_out"]), words
-    told = [line.removeprefix("warning: ") for line in done.stderr.splitlines() if line.startswith("warning: ")]
-    assert sorted(told) == sorted(found["warnings"])  # the terminal has the most important first
-    assert any(line.startswith("radial: not fitted") for line in told)
-
-
-def test_a_prony_series_and_stated_constants(bushfit, tmp_path):
-    grid = ("--direction", "axial", "--amplitudes", "0.2 mm", "--frequencies", "5:155:50 Hz")
-    options = ("--format=prony", "--format=abaqus", "--time-domain", "--cardanic", "1.2 N m/deg, 0.1")
-    done = bushfit("export", "model/model.json", *options, *grid, "-o", tmp_path / "x", "-v")
-    assert names(tmp_path / "x") == {"prony.csv", "bushing.inp"}
-    table = pd.read_csv(tmp_path / "x/prony.csv")
-    assert table["axial amplitude [mm]"].unique() == pytest.approx([0.2])
-    assert table["term"].tolist() == [*range(1, len(table) + 1)]
-    text = (tmp_path / "x/bushing.inp").read_text()
-    assert text.count("TIME=PRONY") == 1
-    assert f"{table['g_i [-]'][0]:.6E}, 0., " in text
-    assert "6.8755E+04" in text  # 1.2 N m/deg in N mm/rad
-    assert "the Prony series is valid only from 5 to 155 Hz, error up to" in done.text
-    assert "the stated constant, 68.755 N m/rad, loss factor 0.1" in done.text
-    grid = (*grid[:4], "--frequencies", "20 Hz")
-    bushfit("export", "model/model.json", "--format=adams", *options[3:], *grid, "-o", tmp_path / "y")
-    damping = dict(re.findall(r"(T[XY]|FZ)_DAMPING\s*=\s*(\S+)", (tmp_path / "y/bushing_ride.bus").read_text()))
-    bushfit("predict", "model/model.json", *grid, "--no-plots", "-o", tmp_path / "z")
-    point = pd.read_csv(tmp_path / "z/axial.csv").iloc[0]
-    angles = {"TX": 0.1, "TY": 0.1, "FZ": point["loss factor [-]"]}
-    assert {name: float(angle) for name, angle in damping.items()} == pytest.approx(
-        {name: np.degrees(np.arctan(loss)) for name, loss in angles.items()}, rel=1e-4
-    )
-
-
-def test_without_a_grid_it_is_the_measured_one_and_files_say_where_they_hold(root, tmp_path):
-    """By the model file alone, at levels that no other grid has."""
-    typing(root)("fit", "data/practice/case_000/bushing.toml", "-o", tmp_path / "fit", "--no-plots")
-    typing(root)("export", tmp_path / "fit/model.json", *ALL[:4], "-o", tmp_path / "x")
-    for place, levels in (("axial", [0.2, 0.4, 1.0]), ("radial", [0.05, 0.1, 0.2])):
-        table = pd.read_csv(tmp_path / f"x/{place}.csv")
-        measured = pd.read_csv(root / f"data/practice/case_000/sweep_{place}.csv")
-        assert table["amplitude [mm]"].unique() == pytest.approx(levels)
-        assert table["frequency [Hz]"].unique() == pytest.approx(measured.iloc[:, 0].unique())
-    said = (
-        *("campaign: case 000, bushing.toml", "tests: 4, no date stated"),
-        "valid: axial, 0.1 to 155 Hz, 0.2 to 2 mm, temperature not stated, fitted",
-        "valid: radial, 0.1 to 155 Hz, 0.0483 to 0.483 mm, temperature not stated, not fitted",
-    )
-    today = f" on {datetime.now(UTC).date().isoformat()}"
-    for deck in ("bushing.bdf", "bushing.inp", "bushing_car.bus"):
-        text = " ".join((tmp_path / "x" / deck).read_text().replace("** |", "$ |").replace("\n$ |", "").split())
-        for words in (*said, today):
-            assert words in text, (deck, words)
-    assert (pd.read_csv(tmp_path / "x/provenance.csv")["what"] == "valid").sum() == 2
-
-
-def test_a_deck_is_of_the_temperature_asked_for(bushfit, root, tmp_path):
-    model = document(root / "data/arm_bushing/truth.json")
-    model["effects"].append("temperature")
-    for name, value in (("softening", 4e-3), ("shift", 0.08)):
-        model["parameters"][f"temperature.{name}"] = {"value": value, "unit": "1/K", "vary": False}
-    (tmp_path / "m.json").write_text(json.dumps(model))
-    grid = ("--direction", "axial", "--frequencies", "10, 50 Hz", "--amplitudes", "0.2 mm", "--temperature", "60 degC")
-    formats = ("--format", "nastran", "--format", "csv")
-    done = bushfit("export", tmp_path / "m.json", *formats, *grid, "-o", tmp_path / "x")
-    assert "3 more limits of the formats: -v prints all" in done.text
-    table, warm = pd.read_csv(tmp_path / "x/axial.csv"), RubberConditions(60.0 + CELSIUS)
-    exact = load_result(tmp_path / "m.json").model.stiffness("axial", table["frequency [Hz]"], 2e-4, conditions=warm)
-    assert table["storage stiffness [N/mm]"].to_numpy() == pytest.approx(exact.real / 1e3, rel=1e-6)
-    deck = (tmp_path / "x/bushing.bdf").read_text()
-    assert "$ temperature: 60 degC" in deck
-    assert f"{exact[1].real / 1e3:.4E}" in deck
-    cold = ("export", root / "data/arm_bushing/truth.json", "--format", "nastran", "--temperature", "60 degC")
-    refused(bushfit(*cold, "-o", tmp_path / "y", status=2), tmp_path / "y", "the model has no effect of temperature")

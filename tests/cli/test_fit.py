@@ -8,41 +8,17 @@ import numpy as np
 import pandas as pd
 import pytest
 from commandline import Done, Run, typing
-from shell import CAMPAIGN, document, names, values
+from shell import CAMPAIGN, document, values
 from virtual_rig import LOOP, MOUNT, SWEEPS, rig
 
 from bushfit.model.file import load_result
 
-FILES = {
-    "fit-static": {"static.json", "loops.csv", "loops.png"},
-    "fit-dynamic": {"dynamic.json", "sweeps.csv", "sweeps.png"},
-    "fit": {"model.json", "loops.csv", "loops.png", "sweeps.csv", "sweeps.png"},
-}
 SWEEP = "data/cmp_15961/sweep_axial.csv"
 REPEATS_OFF = "repeats differ as a whole by an error of"
 ROWS_APART = "repeats of the same points differ by up to"
 #: Files that run and diagnose write alike.
 ALIKE = ("diagnosis.json", "gap.csv", "candidates.csv")
 UNKNOWN = "the tests do not determine mu, m, alpha (95 % interval of +-100 % or more)"
-
-
-@pytest.mark.parametrize("command", FILES)
-def test_fits_write_the_files_of_the_interface(bushfit, tmp_path, command):
-    done = bushfit(command, CAMPAIGN, "-o", tmp_path / "x", "--max-nrmse", "5 %")
-    assert names(tmp_path / "x") == FILES[command]
-    for word in ("parameter", "std error", "95 % interval", "unit", "NRMSE"):
-        assert word in done.text
-
-
-def test_the_paper_s_order_by_hand(bushfit, tmp_path):
-    """fit-static, fit-dynamic --static, predict: each takes what the one before wrote."""
-    s, d, p = (tmp_path / name for name in "sdp")
-    bushfit("fit-static", CAMPAIGN, "-o", s, "--no-plots")
-    bushfit("fit-dynamic", CAMPAIGN, "--static", s / "static.json", "-o", d, "--no-plots")
-    bushfit("predict", d / "dynamic.json", "-o", p, "--no-plots", "--direction", "torsion")
-    assert names(p) == {"torsion.csv"}
-    again = bushfit("fit-static", CAMPAIGN, "--dynamic", d / "dynamic.json", "-o", tmp_path / "s2", "--no-plots")
-    assert "left out" not in again.stderr
 
 
 def test_the_dynamic_fit_takes_the_smallest_amplitude_of_all_sweeps(own):
@@ -91,17 +67,6 @@ def test_a_test_that_repeats_another_and_lies_far_off_is_told(own, kind, file, c
         assert re.search(rf"again(\.csv)?: it repeats {file}, and their stiffness differs by 1\d %", told), told
 
 
-def test_the_gain_error_of_loops_is_said(own):
-    errors, plain = {}, (own / CAMPAIGN).read_text(encoding="utf-8")
-    for stated in ("", "0.5 %", "0 %"):
-        campaign = plain + f'\n[rig]\ngain_error = "{stated}"\n' * bool(stated)
-        (own / CAMPAIGN).write_text(campaign, encoding="utf-8")
-        done = typing(own)("fit", CAMPAIGN, "-o", "out", "--no-plots", "--force")
-        assert ("gain error of a loop 0.5 %" in done.text) is (stated != "0 %")
-        errors[stated] = document(own / "out/model.json")["fit"]["loop_gain_error"]
-    assert errors == {"": 0.005, "0.5 %": 0.005, "0 %": 0.0}
-
-
 def test_a_bar_in_tension_and_a_coupon_in_shear_of_one_rubber_have_one_fit(typed, tmp_path):
     """By hand: a bar has three times the modulus, and the same energy at a strain sqrt(3) times smaller."""
     frequency, strain = (axis.ravel() for axis in np.meshgrid([5, 10, 20, 40, 80], [0.2, 0.7, 2.0, 6.0]))
@@ -116,44 +81,6 @@ def test_a_bar_in_tension_and_a_coupon_in_shear_of_one_rubber_have_one_fit(typed
         typed("init", f"{symbol}.csv", "-o", f"{symbol}.toml")
         fitted[symbol] = values(typed("fit", f"{symbol}.toml", "-o", symbol, "--no-plots", "--json"))
     assert fitted["E"] == pytest.approx(fitted["G"], rel=1e-3)
-
-
-def held(own: Path, mu: str) -> None:
-    """The campaign holds all five parameters."""
-    held = {"mu": mu, "m": "0.2 MPa*s^alpha", "alpha": 0.24, "sigma_fmax": "14.6 kPa", "eps_half": 0.013}
-    with (own / CAMPAIGN).open("a", encoding="utf-8") as campaign:
-        for key, value in held.items():
-            campaign.write(f"\n[fit.{key}]\nvalue = {json.dumps(value)}\nvary = false\n")
-
-
-@pytest.mark.parametrize(("command", "loss"), [("fit-static", "linear"), ("fit-dynamic", "soft_l1"), ("run", "linear")])
-def test_five_held_parameters_are_checked_against_the_tests(own, command, loss):
-    held(own, "1.09 MPa")
-    done = typing(own)(command, CAMPAIGN, "-o", "x", "--no-plots", "--loss", loss)
-    assert "nothing was fitted, because every parameter is fixed; the given values meet the tests" in done.stderr
-    found = document(next((own / "x").glob("[sdm]*.json")))
-    assert {entry["vary"] for entry in found["parameters"].values()} == {False}
-    assert found["parameters"]["mu"]["value"] == 1.09e6
-    assert found["fit"]["nrmse"] < 0.01
-    assert all(place["held_out"] for place in found["fit"]["usable"]), "given values are predictions"
-
-
-def test_held_parameters_that_miss_the_tests_are_said_to(own):
-    held(own, "1.3 MPa")
-    done = typing(own)("fit", CAMPAIGN, "-o", "x", "--no-plots", "--max-nrmse", "0.02", status=1)
-    assert "the given values miss the tests by" in done.stderr
-    assert "is above --max-nrmse 0.02" in done.stderr
-    assert "model.json" in names(own / "x")
-    assert "every parameter is fixed" in typing(own)("diagnose", CAMPAIGN, "-o", "y", "--no-plots", status=2).stderr
-
-
-def test_tests_are_no_prior_of_themselves(own):
-    typing(own)("fit", CAMPAIGN, "-o", "x", "--no-plots")
-    with (own / CAMPAIGN).open("a", encoding="utf-8") as campaign:
-        campaign.write('\n[fit]\nprior = "../x/model.json"\n')
-    refused = typing(own)("fit", CAMPAIGN, "-o", "y", "--no-plots", status=2).stderr
-    assert "the prior was fitted to tests of this campaign" in refused
-    assert "loop_axial_1.csv" in refused
 
 
 def test_a_wrong_unit_is_the_headline(own):
@@ -179,29 +106,6 @@ def test_a_parameter_on_a_bound_shows_no_interval(own):
         (row,) = [line for line in done.text.splitlines() if line.split()[:1] == [name]]
         assert row.split()[:3] == [name, "(at", f"{end})"]
         assert " to " not in row
-
-
-def test_run_does_the_whole_chain_and_says_what_two_steps_cost(bushfit, tmp_path):
-    done = bushfit("run", CAMPAIGN, "-o", tmp_path / "x", "-v")
-    tables = {f"{kind}.{end}" for kind in ("loops", "sweeps", "axial", "radial") for end in ("csv", "png")}
-    assert {"static.json", "dynamic.json", "model.json"} | tables <= names(tmp_path / "x")
-    assert "CMP 15 961: static and dynamic fit in turn" in done.text
-    assert f"use {tmp_path / 'x/model.json'}, the joint fit" in done.text
-    assert "springpot was left out" in done.text
-    radial = pd.read_csv(tmp_path / "x" / "radial.csv")
-    assert list(radial.columns[:2]) == ["frequency [Hz]", "amplitude [mm]"]
-    assert len(radial) == 48
-    ordered = radial.sort_values(["amplitude [mm]", "frequency [Hz]"], ignore_index=True)
-    pd.testing.assert_frame_equal(radial, ordered)
-
-
-def test_run_with_an_effect_shows_what_diagnose_shows(root, tmp_path):
-    done = typing(root)("run", "configs/mystery_mount.toml", "-o", tmp_path / "x", "--no-plots")
-    for words in ("Mystery mount: named", "sleeve_compliance (", "  held out  ", " x noise: measured r", "next test:"):
-        assert done.text.count(words) == 1
-    assert "model with the added effects" in done.text
-    assert "was not fitted, and the model misses it" not in done.text, "of the joint fit, which is not the one to use"
-    assert f"{tmp_path / 'x/model.json'}, with sleeve_compliance; joint.json: the fit without effects" in done.text
 
 
 def both(bushfit: Run, campaign: str, folder: Path) -> tuple[Done, Done]:

@@ -1,45 +1,16 @@
 """`inspect` as typed: told on standard error, the campaign's text on standard output, one error for what is bad."""
 
-import json
-import re
 import tomllib
 from pathlib import Path
 
 import pandas as pd
 import pytest
-from shell import BUSHING, names, refused
+from shell import BUSHING, refused
 
 from bushfit.campaign.campaign import load_campaign
 
 CLEAN = ("data/arm_bushing/loop_axial_1.csv", "data/arm_bushing/sweep_radial.csv")
 RECORD = "data/cmp_15961_raw/stepped_sine_axial.csv"
-
-
-def test_files_are_told_and_the_campaign_s_text_can_be_pasted(typed, root, tmp_path):
-    done = typed("inspect", *(root / file for file in (*CLEAN, RECORD)), "-o", "x")
-    assert names(tmp_path / "x") == {"inspect.png"}
-    campaign = tomllib.loads(done.stdout)
-    assert [(kind, test["direction"]) for kind, (test,) in campaign.items()] == [
-        ("loops", "axial"), ("sweeps", "radial"),
-    ]  # fmt: skip
-    assert "bushfit reduce" in done.stdout
-    assert done.stderr.count("nothing unusual") == 3
-    assert "mean displacement: 0 mm" in done.stderr
-    assert "amplitudes: 0.1005, 0.1999, 0.4994 mm zero-to-peak, as reached" in done.stderr
-    assert not re.search(r": -?[\d.]+e[-+]?\d", done.stderr)
-    for words in ("a hysteresis loop, axial", "taken for", "separated by comma", "0.1 Hz, a sine", "frequencies"):
-        assert words in done.stderr
-
-
-def test_json_holds_everything_and_many_files_make_several_pictures(typed, root, tmp_path):
-    written = json.loads(typed("inspect", *(root / file for file in CLEAN), "--json", "--no-plots").stdout)
-    loop, sweep = written["files"]
-    assert (loop["kind"], sweep["kind"]) == ("loop", "sweep")
-    assert [column["role"] for column in loop["columns"]] == ["time", "displacement", "force"]
-    assert loop["odd"] == []
-    assert "[[loops]]" in written["campaign"]
-    typed("inspect", *[root / CLEAN[1]] * 6, "-o", "x")
-    assert names(tmp_path / "x") == {"inspect.png", "inspect_2.png"}
 
 
 def test_bad_files_are_told_in_the_order_given_the_last_as_the_error(typed, root, tmp_path):

@@ -5,15 +5,13 @@ import shutil
 
 import pandas as pd
 import pytest
-from shell import BUSHING, GEOMETRY, document, names, refused, values
+from shell import BUSHING, GEOMETRY, document, names, values
 
 from bushfit.geometry import Direction
 from bushfit.reading.stated import SweepFile
 from bushfit.reading.sweeps import read_sweep
 
 RECORD = "data/cmp_15961_raw/stepped_sine_axial.csv"
-RESONANCE = "data/measured/epdm_70/shaker_1g_573g.csv"
-MASS = ("--mass", "0.573 kg", "--mass-added", "14.8 g")
 
 
 def test_simulate_writes_a_campaign_that_run_takes(bushfit, tmp_path):
@@ -58,30 +56,3 @@ def test_a_raw_record_becomes_a_sweep_that_fits(typed, root, tmp_path, paper_mod
         off = entry["value"] / table_1[name] - 1.0
         assert abs(off) < 0.03
         assert abs(off) * table_1[name] < 3.0 * entry["stderr"]
-
-
-@pytest.mark.parametrize(
-    ("options", "said"),
-    [
-        (("--force-sign", "-1"), "the force falls where the displacement rises"),
-        (("--levels", "0.1 deg"), "--levels"),
-        (("--cycles", "40"), "no steady sine was found"),
-    ],
-)
-def test_options_that_do_not_fit(typed, root, tmp_path, options, said):
-    refused(typed("reduce", root / RECORD, "-o", "x", *options, status=2), tmp_path / "x", said)
-
-
-def test_a_measured_test_becomes_a_sweep(typed, root, tmp_path):
-    done = typed("reduce", root / RESONANCE, *MASS, "--direction", "axial", "-o", "x", "--json")
-    assert names(tmp_path / "x") == {"sweep.csv", "reduce.png"}
-    document = json.loads(done.stdout)
-    assert (document["mass_kg"], document["resonance_Hz"]) == pytest.approx((0.5878, 230.465))
-    assert "100 points of 2000 rows; resonance at 230.5 Hz, |T| 8.03" in done.stderr
-    table = pd.read_csv(tmp_path / "x/sweep.csv")
-    columns = ["frequency [Hz]", "amplitude [mm]", "stiffness [N/mm]", "loss factor [-]", "relative error [-]"]
-    assert list(table)[:5] == columns == list(document["points"])[:5]
-    assert table["stiffness [N/mm]"].between(1200, 1600).all()
-    assert (table["relative error [-]"] < 0.2).all()
-    assert table["amplitude [mm]"].max() == pytest.approx(0.0396, rel=0.01)
-    assert table["frequency [Hz]"].is_monotonic_increasing

@@ -6,10 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from commandline import typing
-from reading_html import parsed
-from shell import BUSHING, document
-
-from bushfit.units import number
+from shell import BUSHING
 
 SIMULATED = f"""{BUSHING}
 [simulate]
@@ -64,38 +61,6 @@ def test_simulated_motions_have_the_stated_spectra(campaign):
         frequency = np.fft.rfftfreq(len(table), table["time [s]"][1])
         low, high = (spectrum[(frequency > end) & (frequency < 2.0 * end)].mean() for end in (5.0, 15.0))
         assert np.sqrt(low / high) == pytest.approx(ratio, rel=0.25)
-
-
-def test_run_compares_measured_and_predicted_force(campaign, bushfit, tmp_path):
-    done = bushfit("run", campaign, "-o", tmp_path / "run")
-    assert "validation records (never fitted)" in done.text
-    table = pd.read_csv(tmp_path / "run/validation.csv")
-    assert table["test"].tolist() == [f"record_axial_{number}" for number in (1, 2, 3)]
-    assert (table["NRMSE [%]"] < 0.6).all()
-    assert (table["NRMSE before [%]"] > 2.0 * table["NRMSE [%]"])[:2].all()
-    assert table[["peak gap [%]", "energy gap [%]"]].abs().max().max() < 3.0
-    record = pd.read_csv(tmp_path / "run/validation_record_axial_1.csv")
-    error = record["force [N]"] - record["measured force [N]"]
-    nrmse = 200.0 * np.sqrt(np.mean(error**2)) / np.ptp(record["measured force [N]"])
-    assert table["NRMSE [%]"][0] == pytest.approx(nrmse, rel=1e-3)
-    inside = record["measured force [N]"].between(record["force [N], low"], record["force [N], high"])
-    assert table["points in band [%]"][0] == pytest.approx(100.0 * inside.mean(), abs=0.1)
-    entry = document(tmp_path / "run/diagnosis.json")["validation"][0]
-    assert (entry["test"], entry["direction"]) == ("record_axial_1", "axial")
-    assert 100.0 * entry["nrmse"] == pytest.approx(nrmse, rel=1e-3)
-    for key, header in (
-        ("nrmse_before", "NRMSE before [%]"),
-        ("peak_gap", "peak gap [%]"),
-        ("energy_gap", "energy gap [%]"),
-        ("share_inside", "points in band [%]"),
-    ):
-        assert 100.0 * entry[key] == pytest.approx(table[header][0], rel=1e-3, abs=1e-3)
-    bushfit("report", tmp_path / "run", "-o", tmp_path / "page")
-    listed = " ".join(["record_axial_1 axial", *(number(value, 3) for value in table.iloc[0, 2:])])
-    for folder in ("run", "page"):
-        page = parsed((tmp_path / folder / "report.html").read_text()).text
-        assert "Validation record record_axial_1, never fitted" in page
-        assert listed in page
 
 
 def test_a_low_pass_and_corrections_of_a_record_are_stated(campaign, bushfit, tmp_path):

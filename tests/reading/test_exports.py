@@ -11,6 +11,7 @@ import numpy as np
 import openpyxl
 import pandas as pd
 import pytest
+import references
 import scipy.io
 from commandline import typing
 
@@ -69,25 +70,35 @@ LOOP = expected("loop")
 TIME, DISPLACEMENT, FORCE = LOOP["time"], 1e3 * LOOP["displacement"], LOOP["force"]
 
 
-@pytest.mark.parametrize("case", CASES.values(), ids=CASES)
-def test_an_export_is_read_right_or_raises_a_question(case, tmp_path):
+def read_case(case: Mapping[str, Any], folder: Path) -> list[str]:
+    """Check what an export is read as, or the question that it raises. Returns: lines for the reference."""
     content, name = (FILES / case["file"]).read_bytes(), case.get("name", "export.txt")
     if "head" in case:
         content = "\n".join(case["head"]).encode() + content[content.index(b"\n") :]
-    (tmp_path / name).write_bytes(content)
+    folder.mkdir()
+    (folder / name).write_bytes(content)
     says, stated = case.get("says", ()), case.get("stated", {})
     if case["kind"] == "question":
-        done = typing(tmp_path)("inspect", name, *options({"direction": "axial", **stated}), "--json", status=2)
+        done = typing(folder)("inspect", name, *options({"direction": "axial", **stated}), "--json", status=2)
         assert [words for words in says if words not in done.stderr] == []
-        assert [path.name for path in tmp_path.iterdir()] == [name]
-        return
-    document, tests = inspected(tmp_path, name, **stated)
+        assert [path.name for path in folder.iterdir()] == [name]
+        return references.text_lines(done.stderr)
+    document, tests = inspected(folder, name, **stated)
     notes = " | ".join(text for seen in document["files"] for text in (*seen["odd"], *seen["facts"].values()))
     assert [words for words in says if words not in notes] == []
     assert {seen["kind"] for seen in document["files"]} == {case["kind"]}
     assert tests
     for test in tests:
         check(test, expected(case.get("expected", case["kind"])), 0.06 if "spread" in notes else 2e-3)
+    return [line for seen in document["files"] for line in references.document_lines("", seen)]
+
+
+@pytest.mark.parametrize("initial", sorted({name[0].lower() for name in CASES}))
+def test_an_export_is_read_right_or_raises_a_question(initial, tmp_path, file_regression):
+    """Cases whose name begins with one letter."""
+    cases = [name for name in CASES if name[0].lower() == initial]
+    lines = [line for n, name in enumerate(cases) for line in (name, *read_case(CASES[name], tmp_path / str(n)))]
+    file_regression.check("\n".join(lines) + "\n", basename=initial, encoding="utf-8", check_fn=references.check)
 
 
 @pytest.mark.parametrize(

@@ -1,97 +1,83 @@
-"""Figures of predictions, fits, raw files, reductions and Maxwell arms: each point is drawn where it was measured."""
+"""Figures of tests with many amplitudes: nothing leaves the page, and levels have a legend or a colour bar."""
 
-from pathlib import Path
+from typing import Any
+from unittest import mock
 
 import numpy as np
-import pandas as pd
 import pytest
-from figures import (
-    gap,
-    legend,
-    lines,
-    loops,
-    points,
-    prediction,
-    sweeps,
-    whole,
-)
+from commandline import typing
 from matplotlib.colors import to_rgba
+from matplotlib.figure import Figure
 from tries import some
 
-from bushfit.geometry import Direction
-from bushfit.inspection.opening import read_history
-from bushfit.inspection.record import Inspection
-from bushfit.model.result import Result
-from bushfit.reading.finding import find_table
-from bushfit.reading.headers import RESONANCE_COLUMNS
-from bushfit.reading.resonance import read_resonance
-from bushfit.reduction.resonance import reduce_resonance
-from bushfit.reduction.steps import reduce
-from bushfit.report.plots.inspection import inspection_figure, reduction_figure, resonance_figure
+from bushfit.report.plots.style import fixed_settings
 
-LONG_NAME = "a file whose name tells all that is known of the test " * 3
+CAMPAIGN = """
+[bushing]
+name = "A name that tells all that is known of the bushing and of its tests"
+inner_radius = "10 mm"
+outer_radius = "18 mm"
+length = "34 mm"
+[simulate]
+noise = "1 %"
+[[simulate.sweeps]]
+direction = "axial"
+frequencies = {{ start = "5 Hz", stop = "155 Hz", step = "10 Hz" }}
+amplitudes = {}
+[simulate.parameters]
+mu = "1.09 MPa"
+m = "0.2 MPa*s^alpha"
+alpha = 0.24
+sigma_fmax = "14.6 kPa"
+eps_half = 0.013
+"""
+#: A picture that is higher does not fit on three pages of A4 [inch].
+HIGHEST = 33.0
 
 
-def test_differences_are_measured_minus_model_everywhere(paper_model, stiff, swept, looped):
-    residuals = sweeps(stiff, swept(paper_model)).axes[2]
-    assert all(np.mean(line.get_ydata()) < -5.0 for line in points(residuals))
-    line = lines(sweeps(stiff, swept(paper_model)).axes[0])[0]
-    wanted = 1e-3 * np.abs(stiff.stiffness("axial", line.get_xdata(), 1e-4))
-    np.testing.assert_allclose(line.get_ydata(), wanted, rtol=1e-6)
-    phase = loops(stiff, looped(paper_model, 1e-3)).axes[1]
-    (means,) = lines(phase)
-    assert means.get_ydata()[0] < 0.0 < means.get_ydata()[len(means.get_ydata()) // 2], "at the upper turn, the lower"
+@fixed_settings()
+def assert_whole(figure: Figure) -> None:
+    """Nothing leaves the figure, and no panel is too small."""
+    figure.draw_without_rendering()
+    boxes = [axes.get_tightbbox() for axes in figure.axes]
+    boxes += [legend.get_window_extent() for axes in figure.axes if (legend := axes.get_legend())]
+    for box in filter(None, boxes):
+        assert min(box.x0, box.y0) >= -1
+        assert max(box.x1 - figure.bbox.x1, box.y1 - figure.bbox.y1) <= 1
+    width, height = figure.get_size_inches()
+    assert height < HIGHEST
+    for place in (axes.get_position() for axes in figure.axes if axes.axison):
+        assert (place.height * height > 0.5, place.width * width > 1.2) == (True, True)
 
 
 @pytest.mark.parametrize("count", some([8, 40], {40}))
-def test_sweeps_of_many_amplitudes(paper_model, swept, count):
-    """A line an amplitude, named by a legend as long as that can, else by a colour bar."""
-    amplitudes = np.geomspace(2e-5, 1e-3, count)
-    data_set = swept(paper_model, amplitudes=amplitudes, repeats=1)
-    figure = whole(sweeps(paper_model, data_set), apart=False)
-    assert figure.axes[2].get_xlabel() == "frequency [Hz]"
+def test_levels_are_named_by_a_legend_or_a_colour_bar(tmp_path, count):
+    figures: list[Figure] = []
+
+    def keep(figure: Figure, *_: Any, **options: Any) -> bytes:
+        figures.append(figure)
+        return b""
+
+    amplitudes = [f"{amplitude:.4g} mm" for amplitude in np.geomspace(0.02, 1.0, count)]
+    (tmp_path / "plan.toml").write_text(CAMPAIGN.format(amplitudes))
+    run, file = typing(tmp_path), "s/sweep_axial.csv"
+    run("simulate", "plan.toml", "-o", "s")
+    with mock.patch("bushfit.report.plots.style.to_image", keep):
+        run("inspect", file, "-o", "i")
+        run("fit", "s/campaign.toml", "-o", "f")
+        run("predict", "f", "--campaign", "s/campaign.toml", "--direction", "axial", "-o", "p")
+        run("diagnose", "s/campaign.toml", "--max-effects", "0", "--no-report", "-o", "d")
+    assert len(figures) == 4
+    for figure in figures:
+        assert_whole(figure)
+    sweep = figures[1].axes
     if count > 8:
-        (bar,) = figure.axes[1].child_axes
+        (bar,) = sweep[1].child_axes
         names = [tick.get_text() for tick in bar.get_yticklabels()]
-        assert len(names) == 8
-        assert (names[0], names[-1], bar.get_title()) == ("0.02 mm", "1 mm", "amplitude")
-        drawn = points(figure.axes[0])[0].get_color()
+        assert (len(names), names[0], names[-1], bar.get_title()) == (8, "0.02 mm", "1 mm", "amplitude")
+        drawn = next(line for line in sweep[0].get_lines() if line.get_linestyle() == "None").get_color()
         np.testing.assert_allclose(bar._colorbar.mappable.to_rgba(0), to_rgba(drawn), err_msg="of the smallest")
     else:
-        assert len(legend(figure.axes[1])) == count
-    whole(gap(paper_model, paper_model, [data_set]), apart=False)
-    whole(prediction(Result(paper_model), Direction.AXIAL, data_set, amplitudes=amplitudes), apart=False)
-    seen = Inspection(Path(f"{LONG_NAME}.csv"), "sweep", Direction.AXIAL, {}, (), {}, (), {}, data_set.test)
-    left, right = whole(inspection_figure([seen]), apart=False).axes
-    assert len(points(left)) == count
-    assert len(right.child_axes) == (count > 8)
-    assert right.child_axes or len(legend(right)) == count
-
-
-def test_a_resonance_shows_the_amplitudes_reached_in_mm(root):
-    table = find_table(root / "data/measured/epdm_70/shaker_1g_573g.csv", RESONANCE_COLUMNS)
-    found = reduce_resonance(read_resonance(table, Direction.AXIAL), 0.5878)
-    (reached,) = points(whole(resonance_figure(found, "x")).axes[1])
-    np.testing.assert_allclose(reached.get_ydata(), 1e3 * found.amplitude)
-
-
-def test_a_reduction_shows_the_cycles_used_and_twice_the_standard_error(root):
-    history, _ = read_history(root / "data/cmp_15961_raw/stepped_sine_axial.csv", {"direction": "axial"})
-    reduction = reduce([history])
-    figure = whole(reduction_figure(reduction, [history], "x"))
-    strip, magnitude, loss, noise, distortion = figure.axes
-    table = pd.DataFrame([vars(step) for step in reduction.steps]).sort_values(["level", "frequency"])
-    for (_, steps), line in zip(table.groupby("level"), strip.get_lines()[1:], strict=True):
-        times = line.get_xdata()[np.isfinite(line.get_ydata())]
-        assert all(
-            ((times > start) & (times < end)).any() for start, end in zip(steps["start"], steps["end"], strict=True)
-        )
-    stiffness, tangent = 1e-3 * table["stiffness"].abs(), np.tan(np.angle(table["stiffness"]))
-    errors = stiffness * table["gain_error"], (1.0 + tangent**2) * table["phase_error"]
-    for axes, value, error in zip((magnitude, loss), (stiffness, tangent), errors, strict=True):
-        bars = np.array([bar for lines in axes.collections for bar in lines.get_segments()])[:, :, 1]
-        np.testing.assert_allclose(bars, np.column_stack([value - 2.0 * error, value + 2.0 * error]), rtol=1e-6)
-    drawn = [np.concatenate([line.get_ydata() for line in points(axes)]) for axes in (noise, distortion)]
-    np.testing.assert_allclose(drawn[0], 100.0 * np.sqrt(0.5 * (table["gain_error"] ** 2 + table["phase_error"] ** 2)))
-    both = 100.0 * table[["force_distortion", "displacement_distortion"]].to_numpy()
-    np.testing.assert_allclose(np.sort(drawn[1]), np.sort(both.ravel()))
+        legend = sweep[1].get_legend()
+        assert legend
+        assert len(legend.get_texts()) == count

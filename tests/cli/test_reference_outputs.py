@@ -1,0 +1,50 @@
+"""Everything that commands print and write agrees with the references in `test_reference_outputs/`."""
+
+import shlex
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+from string import Template
+from unittest import mock
+
+import pandas as pd
+import pytest
+from commandline import call, state
+from references import check, describe_figure, file_lines, printed_lines, text_lines
+from tries import some
+
+CASES = tomllib.loads((Path(__file__).with_suffix("") / "commands.toml").read_text(encoding="utf-8"))
+PARTS, CAMPAIGNS = CASES.pop("parts"), CASES.pop("campaigns")
+
+
+def change(folder: Path, file: str, column: str, rows: str, factor: str) -> None:
+    """Multiply a column of a CSV by a factor in the rows of a pandas query."""
+    table = pd.read_csv(folder / file)
+    table.loc[table.query(rows).index, column] *= float(factor)
+    table.to_csv(folder / file, index=False)
+
+
+def transcript(folder: Path, commands: str) -> Iterator[str]:
+    """Each command with its exit status, what it printed, and the files that it wrote."""
+    for command in commands.strip().splitlines():
+        yield f"$ bushfit {command}"
+        before = state(folder)
+        if command.startswith("change "):
+            change(folder, *shlex.split(command)[1:])
+            continue
+        done = call(folder, *shlex.split(command))
+        yield from (f"exit status {done.returncode}", *printed_lines(done.stdout), "errors:", *text_lines(done.stderr))
+        for path in sorted(file for file, _ in state(folder).items() - before.items() if not file.name.startswith(".")):
+            yield from (f"-- {path.relative_to(folder).as_posix()}", *file_lines(path))
+
+
+@pytest.mark.parametrize("name", some(CASES, [name for name, case in CASES.items() if not case.get("slow")]))
+def test_commands_print_and_write_what_the_references_hold(name, root, tmp_path, file_regression):
+    for folder in ("configs", "data"):
+        (tmp_path / folder).symlink_to(root / folder)
+    for campaign, text in CAMPAIGNS.items():
+        (tmp_path / f"{campaign}.toml").write_text(Template(text).substitute(PARTS), encoding="utf-8")
+    with mock.patch("bushfit.report.plots.style.to_image", describe_figure):
+        text = "\n".join(transcript(tmp_path, CASES[name]["commands"])) + "\n"
+    text = text.replace(str(tmp_path), "FOLDER").replace(str(root), "ROOT")
+    file_regression.check(text, basename=name, encoding="utf-8", check_fn=check)
