@@ -1,21 +1,16 @@
 """The JSON Schemas: what the commands write validates by a program that is not ours, and what is spoiled does not."""
 
 import json
-import shutil
 import tomllib
 from collections.abc import Iterator, Mapping
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import pytest
-from commandline import typing
 from jsonschema import Draft202012Validator
 
 from bushfit.commands.schema import DESCRIBED, schema
-
-Documents = dict[str, list[Any]]
-INPUTS = ("campaign", "manifest", "limits")
-OUTPUTS = tuple(name for name in DESCRIBED if name not in INPUTS)
 
 
 def closed(node: Any) -> Any:
@@ -26,60 +21,15 @@ def closed(node: Any) -> Any:
     return [closed(each) for each in node] if isinstance(node, list) else node
 
 
+@cache
+def validator(name: str, *, whole: bool) -> Draft202012Validator:
+    """Validator of a schema; with `whole`, of one without further keys."""
+    return Draft202012Validator(closed(schema(name)) if whole else schema(name))
+
+
 def complaints(name: str, document: Any, *, whole: bool = False) -> list[str]:
     """What jsonschema finds wrong with a document; with `whole`, keys that are not described too."""
-    described = closed(schema(name)) if whole else schema(name)
-    return [f"{error.json_path}: {error.message}" for error in Draft202012Validator(described).iter_errors(document)]
-
-
-def written(root: Path, folder: Path) -> Documents:
-    """Documents that commands wrote or printed in a folder, by the schema that describes them."""
-    for name in ("configs", "data"):
-        shutil.copytree(root / name, folder / name)
-    found: Documents = {name: [] for name in DESCRIBED}
-
-    def run(printed: str, *arguments: str, status: int = 0) -> None:
-        done = typing(folder)(*arguments, "--json", "-q", "--no-plots", status=status)
-        found[printed].append(json.loads(done.stdout))
-
-    def read(name: str, pattern: str) -> None:
-        files = sorted(folder.glob(pattern))
-        assert files, pattern
-        found[name] += [json.loads(file.read_text(encoding="utf-8")) for file in files]
-
-    run("run", "run", "data/practice/case_001/bushing.toml", "-o", "run")
-    run("model", "fit", "configs/cmp_15961.toml", "--profile", "--loss", "soft_l1", "-o", "profile")
-    run("model", "fit", "configs/epdm_70.toml", "--direction", "DMA", "-o", "specimens")
-    own = ("--campaign", "data/practice/case_001/bushing.toml")
-    run("prediction", "predict", "run/model.json", *own, "-o", "predicted")
-    shaken = ("--mass", "1 kg", "--base-acceleration", "0.1 g", "--direction", "mount")
-    run("prediction", "predict", "specimens/model.json", *shaken, "-o", "shaken")
-    run("plan", "plan", own[1], "--rivals", "inertia,delay", "--hours", "1", "-o", "plan")
-    run("comparison", "compare", "run", "configs/arm_bushing.toml", "-o", "compared")
-    run("comparison", "compare", "configs/cmp_15961.toml", "-o", "families", "--families", "sliders")
-    (folder / "broken.toml").write_text("[bushing]\n")
-    batch = ("batch", "configs/cmp_15961.toml", "data/practice/case_001/bushing.toml", "broken.toml")
-    asked = ("--command", "fit", "--command", "diagnose", "--at", "axial 25 Hz 0.1 mm", "--jobs", "1")
-    run("batch", *batch, *asked, "--limits", "configs/limits.toml", "-o", "batch", status=1)
-    run("simulation", "simulate", "run/model.json", "-o", "simulated")
-    run("export", "export", "run/model.json", "--format", "nastran", "--format", "xlsx", "-o", "exported")
-    run("response", "respond", "data/arm_bushing/truth.json", "data/road/axial_radial.csv", "-o", "response")
-    loop, sweep = ("data/cmp_15961/loop_axial_1.csv", "data/cmp_15961/sweep_axial.csv")
-    run("inspection", "inspect", loop, sweep)
-    run("reduction", "reduce", "data/cmp_15961_raw/stepped_sine_axial.csv", "-o", "reduced")
-    mass = ("--mass", "1.196 kg", "--specimen", "mount")
-    run("reduction", "reduce", "data/measured/epdm_70/shaker_1g_1196g.csv", *mass, "-o", "shaken_mass")
-    sizes = ("--inner-radius", "10 mm", "--outer-radius", "18 mm", "--length", "34 mm")
-    run("inspection", "init", loop, sweep, *sizes, "-o", "begun")
-    for names in ("model", "static", "dynamic", "joint", "truth"):
-        read("model", f"*/{names}.json")
-    read("diagnosis", "**/diagnosis.json")
-    read("batch", "batch/batch.json")
-    read("row", "batch/bushings/*/row.json")
-    known = {"compare", "plan", *(name for name in DESCRIBED), "static", "dynamic", "joint", "truth"}
-    strange = [file for file in folder.glob("*/**/[!.]*.json") if file.stem not in known]
-    assert [file for file in strange if "data" not in file.parts] == [], "a file that no schema describes"
-    return found
+    return [f"{error.json_path}: {error.message}" for error in validator(name, whole=whole).iter_errors(document)]
 
 
 def keys_without_a_word(node: Any, place: str) -> Iterator[str]:
@@ -99,21 +49,6 @@ def test_a_schema_is_valid_and_says_what_every_key_holds(name):
     assert made["$id"] == f"urn:bushfit:schema:{name}"
     assert made["title"].startswith(f"bushfit {name}: ")
     assert [*keys_without_a_word(made, name)] == []
-
-
-@pytest.mark.slow
-def test_what_is_written_has_the_keys_that_are_described_and_no_others(root, tmp_path):
-    """Of every kind, so that keys which are there now and then have been seen."""
-    found = written(root, tmp_path)
-    wrong = [(name, said) for name in OUTPUTS for each in found[name] for said in complaints(name, each, whole=True)]
-    assert wrong == []
-    assert [name for name in OUTPUTS if not found[name]] == []
-    assert {document["schema"] for document in found["model"]} == {"bushfit/model/1"}
-    assert {document["status"] for document in found["row"]} == {"done", "failed"}
-    assert {"consistent", "named"} <= {document["verdict"] for document in found["diagnosis"]}
-    assert any("profile95" in entry for document in found["model"] for entry in document["parameters"].values())
-    assert any(document["failed"] for document in found["batch"])
-    assert any("joint" in document for document in found["run"])
 
 
 def described_by(file: Path) -> str:

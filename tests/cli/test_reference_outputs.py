@@ -1,5 +1,7 @@
 """Everything that commands print and write agrees with the references in `test_reference_outputs/`."""
 
+import json
+import re
 import shlex
 import tomllib
 from collections.abc import Iterator
@@ -11,7 +13,10 @@ import pandas as pd
 import pytest
 from commandline import call, state
 from references import check, describe_figure, file_lines, printed_lines, text_lines
+from test_schemas import complaints
 from tries import some
+
+from bushfit.commands.schema import DESCRIBED
 
 CASES = tomllib.loads((Path(__file__).with_suffix("") / "commands.toml").read_text(encoding="utf-8"))
 PARTS, CAMPAIGNS = CASES.pop("parts"), CASES.pop("campaigns")
@@ -24,6 +29,12 @@ def change(folder: Path, file: str, column: str, rows: str, factor: str) -> None
     table.to_csv(folder / file, index=False)
 
 
+def assert_described(text: str, source: str) -> None:
+    """A JSON document has the keys of its schema and no others; `source` as in schemas.toml, a regular expression."""
+    name = next(name for name, described in DESCRIBED.items() if re.search(source, described.files))
+    assert complaints(name, json.loads(text), whole=True) == []
+
+
 def transcript(folder: Path, commands: str) -> Iterator[str]:
     """Each command with its exit status, what it printed, and the files that it wrote."""
     for command in commands.strip().splitlines():
@@ -33,8 +44,12 @@ def transcript(folder: Path, commands: str) -> Iterator[str]:
             change(folder, *shlex.split(command)[1:])
             continue
         done = call(folder, *shlex.split(command))
+        if "--json" in command and done.stdout:
+            assert_described(done.stdout, rf"--json of ([\w ]*{command.split()[0]}\b|the {command[:3]}s)")
         yield from (f"exit status {done.returncode}", *printed_lines(done.stdout), "errors:", *text_lines(done.stderr))
         for path in sorted(file for file, _ in state(folder).items() - before.items() if not file.name.startswith(".")):
+            if path.suffix == ".json":
+                assert_described(path.read_text(encoding="utf-8"), rf"\b{path.name}")
             yield from (f"-- {path.relative_to(folder).as_posix()}", *file_lines(path))
 
 
