@@ -232,7 +232,7 @@ def number(value: float, digits: int, sign: str = "") -> str:
     """
     rounded = float(f"{value:.{digits}g}")
     if rounded == 0.0 or not math.isfinite(rounded):
-        return f"{rounded + 0.0:{sign}g}"  # no -0
+        return f"{rounded:{sign}zg}"
     if _LEAST_PLAIN <= abs(rounded) < _LARGEST_PLAIN:
         return f"{rounded:{sign}.{_MOST_DIGITS}g}"
     mantissa, _, power = f"{rounded:.{digits - 1}e}".partition("e")

@@ -90,8 +90,7 @@ def print_tests(output: Output, misfits: Sequence[Misfit], usable: Sequence[Expe
             name, (unit, factor) = test.test, DISPLAYS.get(test.unit or "", (test.unit or "", 1.0))
             if test.held is not None:  # a run, by its amplitude or frequency
                 name = f"  {format_range(unit, factor * (test.value or 0.0))}"
-            gain = f"{round(100 * test.gain, 2) + 0.0:+.2f}"  # no -0
-            figures = (number(100 * test.nrmse, 2), number(test.reduced_chi_square, 2), gain)
+            figures = number(100 * test.nrmse, 2), number(test.reduced_chi_square, 2), f"{100 * test.gain:+z.2f}"
             rows.append((name, test.place, str(test.points), *figures, "" if test.fitted else "not fitted"))
         output.print_table(title, columns, rows, text_columns=2)
     if count := len(tests) - len(worst):

@@ -227,7 +227,7 @@ def _springpot_warning(data: PreparedCampaign, static: FitResult) -> Caveat:
         fixed = {"m": ratio * values["mu"], "alpha": alpha}
         better = _fit_step(data, static.problem.tests, fixed).model.values
         source = f"With the springpot of a typical filled rubber (m = {ratio} mu s^alpha, alpha = {alpha})"
-    changes = ", ".join(f"{name} by {100 * (better[name] / values[name] - 1):+.1f} %" for name in STATIC)
+    changes = ", ".join(f"{name} by {100 * (better[name] / values[name] - 1):+z.1f} %" for name in STATIC)
     return Caveat(
         "springpot_left_out",
         "m and alpha are not known yet, so the springpot was left out: the other parameters include its stiffness and "

@@ -231,7 +231,7 @@ def outlying_points(
         yield Caveat(
             "outlying_point",
             f"data row {row + 1} ({sweep.frequency[row]:.4g} Hz, {level}{repeat}) deviates by "
-            f"{number(100 * np.expm1(distance[row, 0]), 2, '+')} % in |K| and {np.degrees(distance[row, 1]):+.2g} deg "
+            f"{number(100 * np.expm1(distance[row, 0]), 2, '+')} % in |K| and {np.degrees(distance[row, 1]):+z.2g} deg "
             f"from {reference}",
         )
     if outliers.size > _MOST_LISTED:

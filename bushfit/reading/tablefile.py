@@ -85,13 +85,13 @@ def to_csv(table: pd.DataFrame, *, decimal_comma: bool = False) -> bytes:
 def _texts(column: pd.Series[Any], point: str) -> list[str]:
     """Texts of the cells of a column, (n,), with seven digits and the decimal mark `point`; "" for None and NaN."""
     if column.dtype.kind == "f":  # at once: most cells are numbers, and most of the time goes into their texts
-        texts = ["" if value != value else f"{value:.7g}" for value in column.tolist()]
+        texts = ["" if value != value else f"{value:z.7g}" for value in column.tolist()]
         return texts if point == "." else [text.replace(".", point) for text in texts]
 
     def cell_text(value: object) -> str:
         """Text of a cell that may be a number, a text or None."""
         if isinstance(value, float):
-            return "" if value != value else f"{value:.7g}".replace(".", point)
+            return "" if value != value else f"{value:z.7g}".replace(".", point)
         if isinstance(value, str):
             return escape_formula(value)
         return "" if value is None else str(value)

@@ -271,7 +271,7 @@ def format_difference(value: float, width: float) -> str:
         return number(value, 2, "+")
     decimals = max(1 - math.floor(math.log10(width)), 0) if width > 0.0 else _DIGITS
     decimals = min(decimals, _MOST_DECIMALS)
-    return f"{round(value, decimals) + 0.0:+.{decimals}f}"
+    return f"{value:+z.{decimals}f}"
 
 
 def format_p_value(p: float) -> str:

@@ -45,7 +45,7 @@ class ParameterRow(NamedTuple):
 def correlation_texts(result: Result, minimum: float = _STRONG_CORRELATION) -> str:
     """Pairs of parameters whose correlation is at least `minimum` in size, the strongest first: "mu/m -0.96, ..."."""
     pairs = [pair for pair in result.covariance.correlations() if abs(pair[2]) > minimum]
-    return ", ".join(f"{first}/{second} {value:+.2f}" for first, second, value in pairs)
+    return ", ".join(f"{first}/{second} {value:+z.2f}" for first, second, value in pairs)
 
 
 def parameter_rows(result: Result) -> Iterator[ParameterRow]:
