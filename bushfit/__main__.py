@@ -5,7 +5,6 @@ Warnings of Python and its packages are hidden unless Python was started with -W
 
 import _thread
 import gc
-import signal
 import sys
 import time
 import warnings
@@ -35,8 +34,10 @@ def main() -> None:
         warnings.simplefilter("ignore")  # they are for programmers, who ask for them: python -W default -m bushfit
     gc.set_threshold(_OBJECTS)
     sys.unraisablehook = repeat_interrupt
-    signal.signal(signal.SIGTERM, signal.default_int_handler)  # temporary files are removed, as after Ctrl-C
     try:
+        import signal  # slow to import
+
+        signal.signal(signal.SIGTERM, signal.default_int_handler)  # temporary files are removed, as after Ctrl-C
         from bushfit.cli import main as command
 
         command()

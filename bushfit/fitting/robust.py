@@ -9,6 +9,7 @@ Notes:
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -107,7 +108,8 @@ def estimate(problem: FitProblem, *, robust: bool = False, lmfit: bool = False) 
 def outlier_warnings(outliers: Sequence[Outlier], *, robust: bool) -> Iterator[Caveat]:
     """Yield warnings about the outliers that the fit includes and those that it leaves out, with the first rows.
 
-    Outliers of the displacement are always left out, see `prepared_loop`.
+    Several tests of one file are named, and their rows are counted from 1. Outliers of the displacement are always left
+    out, see `prepared_loop`.
 
     Args:
         outliers: outliers of all tests.
@@ -123,7 +125,8 @@ def outlier_warnings(outliers: Sequence[Outlier], *, robust: bool) -> Iterator[C
         rows, lists = defaultdict[str, list[str]](list), []
         for outlier in outliers:
             if (robust or outlier.column == "displacement") == is_excluded:
-                rows[f"{outlier.file or outlier.test}, {outlier.column}"].append(str(outlier.row))
+                is_whole = outlier.file and outlier.test in (outlier.file, Path(outlier.file).stem)
+                rows[f"{outlier.file if is_whole else outlier.test}, {outlier.column}"].append(str(outlier.row))
         for file, numbers in rows.items():
             more = f" and {len(numbers) - _MOST_NAMED} more" if len(numbers) > _MOST_NAMED else ""
             lists.append(f"{file} row{'s' if len(numbers) > 1 else ''} {', '.join(numbers[:_MOST_NAMED])}{more}")
