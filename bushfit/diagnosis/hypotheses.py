@@ -88,10 +88,18 @@ class Hypothesis:
         """True if all effects of the hypothesis were refitted; False if one was weighed in the linear model alone."""
         return self.last is None or self.last.kind != "effect"
 
-    @property
+    @cached_property
     def p_value(self) -> float:
         """Posterior predictive p-value: probability of a larger chi-square than measured if the hypothesis is true."""
-        return self.state.linear.p_value(compound_deviates=self.compound_deviates)
+        linear, group = self.state.linear, self.last.group if self.last else None
+        if group and self.last_change:
+            rows, precision = group.scaled, np.full(len(group.columns), self.last_change**-2)
+            linear = replace(
+                linear,
+                jacobian=np.concatenate((linear.jacobian, rows)),
+                precision=np.concatenate((linear.precision, precision)),
+            )
+        return linear.p_value(compound_deviates=self.compound_deviates)
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,7 +13,7 @@ from bushfit.diagnosis.explanations import Explanation, Group
 from bushfit.diagnosis.faulty_parts import FaultyPart, find_faulty_parts
 from bushfit.diagnosis.projected_columns import CompoundDeviation, GroupSet
 from bushfit.diagnosis.rig_errors import RigErrors, in_scatter_units, rig_errors
-from bushfit.diagnosis.smooth_deviations import compound, unnamed_curves
+from bushfit.diagnosis.smooth_deviations import POWER_LAW, compound, power_laws, unnamed_curves
 from bushfit.effects.contract import Array
 from bushfit.effects.mistakes import USUAL_MODULUS
 from bushfit.fitting.problem import FitResult
@@ -73,7 +73,7 @@ class RecordedTests:
     @cached_property
     def explanations(self) -> list[Explanation]:
         """Explanations of a gap other than effects: faulty parts of the tests, and smooth curves."""
-        return [*find_faulty_parts(self.bare), *unnamed_curves(self.bare)]
+        return [*find_faulty_parts(self.bare), *unnamed_curves(self.bare), *power_laws(self.bare)]
 
     @cached_property
     def compound_in_fits(self) -> Group | None:
@@ -117,7 +117,7 @@ class ExplanationColumns:
     @cached_property
     def curves(self) -> GroupSet | None:
         """Columns of the smooth curves; None without curves."""
-        curves = [e.group for e in self.tests.explanations if e.group and e.kind == "unnamed"]
+        curves = [e.group for e in self.tests.explanations if e.group and e.kind == "unnamed" and e.family != POWER_LAW]
         return GroupSet(curves, self.errors) if curves else None
 
     def with_variance(self, variance: Array) -> ExplanationColumns:

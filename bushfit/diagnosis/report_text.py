@@ -27,7 +27,7 @@ from bushfit.diagnosis.holdout import HoldOut, hold_out
 from bushfit.diagnosis.hypotheses import Hypothesis
 from bushfit.diagnosis.locate import find_regions
 from bushfit.diagnosis.next_test import MEASURE_AGAIN, deciding_test
-from bushfit.diagnosis.priors import LARGEST_CLOSED_GAP, NAMED
+from bushfit.diagnosis.priors import DOES_NOT_FIT, LARGEST_CLOSED_GAP, LEAST_NAMED_SHARE, NAMED
 from bushfit.diagnosis.record import Diagnosis, NamedCause
 from bushfit.diagnosis.rig_shares import with_alternatives
 from bushfit.diagnosis.search import Search
@@ -168,7 +168,11 @@ class DiagnosisWriter:
         advice = self._deciding_advice(candidates[0] if candidates else first)
         if leads := [f"--adopt {name}" for name in self.finding.leads if get_mistake(name) is None]:
             advice = "; ".join(filter(None, (advice, f"to try the leads: bushfit diagnose CAMPAIGN {' '.join(leads)}")))
-        at_fault = " and ".join(part.name for part in first.best.faulty_parts)
+        parts = {part.name for part in first.best.faulty_parts}
+        at_fault, is_faulty = " and ".join(sorted(parts)), self.finding.verdict == "unexplained"
+        if not gap and not first.best.unnamed and first.best.p_value >= DOES_NOT_FIT:
+            shared = (c.probability for c in self.finding.reported if parts & {x.name for x in c.best.faulty_parts})
+            is_faulty |= sum(shared) >= LEAST_NAMED_SHARE
         if gap:
             before, after = (fit.mean_square**0.5 for fit in (self.search.base, gap.after))
             closes = "closes the gap"
@@ -176,17 +180,18 @@ class DiagnosisWriter:
                 closes = f"reduces the gap to {number(after, 2)} times the noise"
             sentences = [f"a smooth correction {closes}: {gap.sentence}", *causes_text(candidates, self.finding)]
             sentences += [f"it is largest at {at_fault}"] if at_fault else []
-        elif at_fault:
+        elif is_faulty and at_fault:
             sentences = [f"measure again first: {at_fault}; all other tests disagree with this part"]
-        elif self.finding.verdict == "unexplained":
+        elif is_faulty:
             sentences = ["the levels disagree by more than the class of the rig, and nothing else is missing"]
             advice = _LEVELS_ADVICE
         else:
-            sentences = ["no known effect closes the gap", *causes_text(candidates, self.finding)]
+            sentences = [*dict.fromkeys(["no known effect explains the gap", *causes_text(candidates, self.finding)])]
+            sentences += [f"it is largest at {at_fault}"] if at_fault else []
         entries = [NamedCause(UNNAMED, gap.evidence, tuple(candidates))] if gap else []
-        places = None if gap else first.best
-        verdict: Verdict = "described" if gap else "unexplained"
-        return self._build(closing, "; ".join(sentences), entries, verdict=verdict, places=places, next_test=advice)
+        places = first.best if is_faulty else None
+        reported: Verdict = "described" if gap else "unexplained"
+        return self._build(closing, "; ".join(sentences), entries, verdict=reported, places=places, next_test=advice)
 
     @property
     def _candidates(self) -> list[Composition]:

@@ -49,9 +49,10 @@ def with_alternatives(result: Result, hypotheses: Sequence[Hypothesis], base: Fi
     probability: dict[frozenset[str], float] = defaultdict(float)
     members: dict[frozenset[str], list[Hypothesis]] = defaultdict(list)
     for hypothesis, share in zip(hypotheses, shares, strict=True):
-        effects = _of_rig(hypothesis.effects)
+        is_large = hypothesis.change > tolerance
+        effects = _of_rig(hypothesis.effects if is_large else ())
         probability[effects] += share
-        if hypothesis.refitted and not hypothesis.claim and hypothesis.change > tolerance:
+        if is_large and hypothesis.refitted and not hypothesis.claim:
             members[effects].append(hypothesis)
     current = _of_rig(result.model.effects) - {*base.model.effects}
     places = {str(test.direction): test.direction for test in base.data_sets}

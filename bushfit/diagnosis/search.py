@@ -28,7 +28,7 @@ from bushfit.diagnosis.projected_columns import GroupSet
 from bushfit.diagnosis.propose import Proposal, has_used_parameters, proposals
 from bushfit.diagnosis.record import DiagnosisSettings
 from bushfit.diagnosis.recorded_tests import RecordedTests, modulus_deviation, record_change
-from bushfit.diagnosis.smooth_deviations import COMPOUND
+from bushfit.diagnosis.smooth_deviations import COMPOUND, POWER_LAW
 from bushfit.diagnosis.verdict import decide_verdict
 from bushfit.effects.mistakes import get_mistake
 from bushfit.errors import FitError, ModelError
@@ -98,6 +98,9 @@ class Search:
         self._log_priors = prior_odds([*self.proposals, *tests.explanations])
         families = {e.family for e in (*self.outlier_clusters, *tests.explanations) if e.kind == "part"}
         self._meeting_odds = log(ODDS["part"] / max(len(families), 1))
+        # disturbances are independent: each cluster alone, and all that are more probable than a coincidence
+        likely = tuple(c for c in self.outlier_clusters if self._meeting_odds + c.log_odds > 0.0)
+        self._cluster_sets = dict.fromkeys(filter(None, [*((c,) for c in self.outlier_clusters), likely]))
 
     def run(self) -> list[Hypothesis]:
         """Run the search: extend the most probable sets of explanations by one more, for a few rounds.
@@ -159,7 +162,10 @@ class Search:
         finding = decide_verdict(self._ordered_hypotheses(), self.settings.tolerance)
         if finding.verdict == "consistent":
             return finding.nothing >= NAMED and self.root.linear.p_value() >= DOES_NOT_FIT
-        return finding.verdict == "named" and finding.reported[0].best.refitted
+        best = finding.reported[0].best
+        if best.last and best.last.family == POWER_LAW and len(best.key) == 1:
+            return finding.reported[0].probability >= NAMED and best.p_value >= DOES_NOT_FIT
+        return finding.verdict == "named" and best.refitted
 
     def _settle_linear(self) -> Iterator[Hypothesis]:
         """Yield the most probable hypotheses that need a refit: their evidence is still that of the linear model."""
@@ -208,11 +214,12 @@ class Search:
         stays.
         """
         candidates = list(hypotheses)
-        for hypothesis, part in product(hypotheses, self.outlier_clusters):
-            log_posterior = hypothesis.log_posterior + self._meeting_odds + part.log_odds
+        for hypothesis, clusters in product(hypotheses, self._cluster_sets):
+            log_odds = sum(self._meeting_odds + cluster.log_odds for cluster in clusters)
+            log_posterior = hypothesis.log_posterior + log_odds
             if hypothesis.change <= self.settings.tolerance:  # what is that small is no part of an explanation
                 hypothesis = self.root.hypotheses[0]
-            change, clusters = max(hypothesis.change, part.size), (*hypothesis.clusters, part)
+            change = max(hypothesis.change, *(cluster.size for cluster in clusters))
             candidates.append(replace(hypothesis, clusters=clusters, log_posterior=log_posterior, change=change))
         for candidate in candidates:
             before = self._known.get(candidate.key)

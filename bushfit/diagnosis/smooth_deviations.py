@@ -9,6 +9,7 @@ stands for the uneven field of a direction is inexact too.
 
 from collections import defaultdict
 from collections.abc import Callable, Hashable, Sequence
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,8 @@ from bushfit.reduction.harmonics import basis
 
 #: Name of the compound's own deviation among unnamed explanations.
 COMPOUND = "compound"
+#: Family of the power laws without a name.
+POWER_LAW = "power law"
 #: Number of patterns of the compound's deviation: with three to five levels more improve nothing.
 _COMPOUND_PATTERNS = 12
 #: Fraction of the compound's deviation that changes over the shorter lengths of a smooth curve: yield and breakdown set
@@ -36,6 +39,11 @@ _COMPOUND_ROUGHNESS = 0.25
 _CURVE_LENGTHS = {"smooth": (1.5, 1.2), "rough": (0.5, 0.5)}
 #: Limits of a curve: number of its nodes and patterns, and least variance of a pattern relative to the largest.
 _CURVE_PATTERNS = {"nodes": 150, "count": 16, "minimum": 1e-4}
+#: Powers of frequency and of amplitude of a law without a name: those of dampers, masses, cubic springs, dry friction.
+_POWERS = (-1, 0, 1, 2)
+#: Powers of the stiffness K to which a relative change in all directions may be proportional: an added stiffness, equal
+#: in N/mm, a gain and a compliance.
+_COMMON_CHANGES = {"equal stiffness": -1, "equal gain": 0, "equal compliance": 1}
 #: Last overtone of a compound's deviation in a steady cycle, and number of waves of its deviation in the first cycle.
 _LAST_OVERTONE, _TRANSIENT_WAVES = 13, 6
 #: Number of phases of a cycle at which harmonics are summed: about six per period of the highest harmonic.
@@ -170,21 +178,16 @@ def unnamed_curves(fit: FitResult) -> list[Explanation]:
         kelvin = sweep.test.temperature
         level = None if kelvin is None else round(float(np.mean(kelvin)) / SAME_TEMPERATURE)
         levels[str(sweep.direction), level].append(sweep)
-    directions: dict[str, list[tuple[Array, Array]]] = defaultdict(list)  # masks of residuals and of operating points
+    directions: dict[str, list[Array]] = defaultdict(list)  # masks of operating points
     for (direction, _), chosen in levels.items():
-        rows = np.zeros(fit.residual.size, dtype=bool)
-        for sweep in chosen:
-            rows[fit.residual_rows[sweep]] = True
         points = np.concatenate([np.full(sweep.frequency.size, sweep in chosen) for sweep in sweeps])
-        directions[direction].append((rows, points))
+        directions[direction].append(points)
     for roughness, lengths in _CURVE_LENGTHS.items() if sweeps else ():
         columns, changes = _smooth_changes(fit, sweeps, lengths, **_CURVE_PATTERNS)
         for direction, masks in directions.items():
-            groups[f"{roughness} {direction}"] = Group(
-                np.concatenate([columns * rows for rows, _ in masks]),
-                np.concatenate([changes * points for _, points in masks]),
-                act_together=True,
-            )
+            of_direction = np.concatenate([changes * points for points in masks])
+            of_rows = _residual_changes(fit, sweeps, of_direction)
+            groups[f"{roughness} {direction}"] = Group(of_rows, of_direction, act_together=True)
         if roughness == "rough" and len(directions) > 1:  # a smooth curve in all directions is the compound's
             groups["rough all"] = Group(columns, changes, act_together=True)
     if loops:
@@ -192,7 +195,41 @@ def unnamed_curves(fit: FitResult) -> list[Explanation]:
         shapes = block_diag(*[basis(np.arange(_PHASES) / _PHASES, SMOOTH_HARMONICS).T] * len(repeats))
         columns = np.concatenate([_repeat_changes(fit, group, MeasuredLoop.smooth_changes) for group in repeats])
         groups["loops"] = Group(columns, shapes, act_together=True)
-    return [Explanation("unnamed", "unnamed", name, group) for name, group in groups.items()]
+    return [Explanation("unnamed", name, name, group) for name, group in groups.items()]
+
+
+def power_laws(fit: FitResult) -> list[Explanation]:
+    """List power laws of frequency and amplitude that can explain a gap for which the library has no effect.
+
+    Most single causes act like (f/f0)^p (X/X0)^q with small whole powers: a law that the library lacks, or one that it
+    has with the other sign, such as a mass for which the rig compensates too much.
+
+    Args:
+        fit: the fitted model and the tests.
+
+    Returns:
+        One explanation for each pair of powers, with any phase: for each direction alone, and if there are several for
+        all together, with an added stiffness or a relative change or a compliance in common.
+    """
+    model, tests, explanations = fit.model, fit.data_sets, list[Explanation]()
+    stiffness = np.concatenate([model.stiffness(t.direction, t.frequency, t.amplitude, kind=t.kind) for t in tests])
+    points = np.concatenate([coordinates(t.frequency, t.amplitude * model.unit_strain(t.direction)) for t in tests])
+    directions = np.concatenate([np.full(test.frequency.size, str(test.direction)) for test in tests])
+    scopes = {str(name): (directions == name).astype(complex) for name in np.unique(directions)}
+    if len(scopes) > 1:
+        first = tests[0].direction.motion  # stiffness has one unit among tests with the same kind of motion
+        alike = np.concatenate([np.full(test.frequency.size, test.direction.motion is first) for test in tests])
+        scopes |= {name: stiffness**power * (alike | (power == 0)) for name, power in _COMMON_CHANGES.items()}
+    powers = list(product(_POWERS, repeat=2))
+    laws = np.exp(np.array(powers) @ (points - points.mean(axis=0)).T)
+    for scope, change in scopes.items():
+        shapes = laws * change
+        shapes /= np.abs(shapes).max(axis=1, keepdims=True)
+        columns = _residual_changes(fit, tests, np.concatenate((shapes, 1j * shapes)))
+        for (p, q), pair in zip(powers, columns.reshape(2, len(powers), -1).swapaxes(0, 1), strict=True):
+            group = Group(pair, np.array([[1.0], [1.0j]]), act_together=True)
+            explanations.append(Explanation("unnamed", POWER_LAW, f"f^{p} X^{q}, {scope}", group))
+    return explanations
 
 
 def _smooth_changes(
@@ -210,15 +247,25 @@ def _smooth_changes(
         Changes of the n whitened residuals due to q independent patterns in phase and in quadrature, (2 q, n), and the
         complex relative changes of stiffness of these patterns at the points of `tests`, (2 q, points).
     """
-    model = fit.model
-    points = [coordinates(test.frequency, test.amplitude * model.unit_strain(test.direction)) for test in tests]
+    points = [coordinates(test.frequency, test.amplitude * fit.model.unit_strain(test.direction)) for test in tests]
     _, shapes = patterns(in_lengths(np.concatenate(points), lengths), **limits)
     changes = (shapes[:, None] * np.array([[1.0], [1.0j]])).reshape(-1, shapes.shape[-1])
-    columns = np.zeros((len(changes), fit.residual.size))
-    for test, change in zip(tests, np.split(changes, np.cumsum([*map(len, points)])[:-1], axis=1), strict=True):
-        stiffness = model.stiffness(test.direction, test.frequency, test.amplitude, kind=test.kind)
-        columns[:, fit.residual_rows[test]] = test.residual_change(change * stiffness, model)
-    return columns, changes
+    return _residual_changes(fit, tests, changes), changes
+
+
+def _residual_changes(fit: FitResult, tests: Sequence[MeasuredTest], changes: Array) -> Array:
+    """Changes of the n whitened residuals due to c relative changes of the stiffness at all points of `tests`, (c, n).
+
+    Args:
+        fit: fitted model and all tests.
+        tests: tests in which the stiffness changes.
+        changes: complex relative changes of the stiffness at the points of `tests`, (c, points).
+    """
+    columns, ends = np.zeros((len(changes), fit.residual.size)), np.cumsum([test.frequency.size for test in tests])
+    for test, change in zip(tests, np.split(changes, ends[:-1], axis=1), strict=True):
+        stiffness = fit.model.stiffness(test.direction, test.frequency, test.amplitude, kind=test.kind)
+        columns[:, fit.residual_rows[test]] = test.residual_change(change * stiffness, fit.model)
+    return columns
 
 
 def _repeat_changes(fit: FitResult, loops: Sequence[MeasuredLoop], changes: Callable[[MeasuredLoop], Array]) -> Array:

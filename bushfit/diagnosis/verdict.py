@@ -139,7 +139,9 @@ def decide_verdict(hypotheses: Sequence[Hypothesis], tolerance: float, *, gap_st
         # all that is probable has these parts; the tests show no other part, but perhaps that there is one
         return _verdict_on_parts(likely, nothing, leads)
     reported, fits = tuple(likely[:MOST_REPORTED]), first.best.p_value >= DOES_NOT_FIT
-    if common and all(part.startswith("part: ") for part in common):  # whatever else there is, this has to go first
+    if (
+        fits and common and all(part.startswith("part: ") for part in common)
+    ):  # whatever else there is, this has to go first
         return Finding("unexplained", nothing, reported, leads)
     share = {name: sum(c.probability for c in compositions if name in c.names) for name in first.names}
     names = tuple(name for name in first.names if share[name] >= NAMED)
@@ -161,13 +163,14 @@ def _verdict_on_parts(likely: Sequence[Composition], nothing: float, leads: Sequ
     """
     first, best, reported = likely[0], likely[0].best, tuple(likely)
     leads = tuple(dict.fromkeys((*first.causes, *leads)))
-    if first.may_mislead or not (first.causes or first.unnamed):
+    fits = best.p_value >= DOES_NOT_FIT
+    if fits and (first.may_mislead or not (first.causes or first.unnamed)):
         return Finding("unexplained", nothing, reported, leads)
     curve = best.unnamed not in ("", COMPOUND) and best.last_change >= (1.0 - LEAST_NAMED_SHARE) * best.change
     # a mistake has to close the gap alone, but for what the rubber does
     rig_effects = any(get_effect(name).level != Level.MATERIAL for name in best.effects)
     compensated = best.claim and (rig_effects or best.faulty_parts)
-    if not first.causes or curve or compensated or best.p_value < DOES_NOT_FIT:
+    if not first.causes or curve or compensated or not fits:
         return Finding("described", nothing, reported, leads)
     partly = first.unnamed or best.levels or first.faulty_parts or (best.claim and best.effects)
     return Finding("partly" if partly else "named", nothing, reported, names=first.names)
@@ -193,10 +196,10 @@ def _leads(pairs: Sequence[tuple[Hypothesis, float]]) -> tuple[str, ...]:
 def _parts_of(hypothesis: Hypothesis) -> frozenset[_Part]:
     """List the parts of a hypothesis; hypotheses with equal parts are merged into one explanation.
 
-    Effects of the rubber are not listed if a deviation of the compound could imitate them. A curve without a name, or a
-    pattern of faulty parts of the tests, is listed only if there is nothing else.
+    Effects of the rubber are not listed if a deviation of the compound, or errors of levels, could imitate them. A
+    curve without a name, or a pattern of faulty parts of the tests, is listed only if there is nothing else.
     """
-    nameless = Level.MATERIAL if hypothesis.compound_deviates else None
+    nameless = Level.MATERIAL if hypothesis.compound_deviates or hypothesis.levels else None
     parts: list[_Part] = [("effect", name) for name in hypothesis.effects if get_effect(name).level != nameless]
     pattern = is_pattern(hypothesis.faulty_parts)
     if not pattern:

@@ -183,6 +183,7 @@ def told(finding: Finding) -> dict[str, float]:
         ({"unnamed": 0.99, "inertia": 0.01}, "described", {"unnamed": 0.99}),
         ({"frequency:50 Hz": 0.5, "frequency:45 to 55 Hz": 0.49, "": 0.01}, "unexplained", {"part: frequency": 1.0}),
         ({"levels": 0.99, "": 0.01}, "unexplained", {"levels": 1.0}),
+        ({"kraus+levels": 0.99, "": 0.01}, "unexplained", {"levels": 1.0}),
         ({"delay+level:1 mm": 0.99, "delay": 0.01}, "unexplained", {"delay+part: level": 0.99}),
         ({"loop:1 mm+loop:2 mm": 0.99, "": 0.01}, "unexplained", {"part: loop": 1.0}),
         ({"loop:1 mm+loop:1 mm again": 0.99, "": 0.01}, "described", {"unnamed": 1.0}),
@@ -252,7 +253,8 @@ def test_a_mistake_that_does_not_close_the_gap_alone_is_a_lead(companion):
     assert (finding.verdict, finding.leads[0]) == ("described", "peak_to_peak")
 
 
-@pytest.mark.parametrize("parts", ["inertia+compound", "peak_to_peak", "peak_to_peak+compound"])
+@pytest.mark.parametrize("parts", ["inertia+compound", "peak_to_peak", "peak_to_peak+compound", "level:1 mm"])
 def test_what_does_not_fit_the_tests_is_a_lead_and_no_name(parts):
     finding = decide_verdict([one(parts, 0.99, p_value=1e-4)], TOLERANCE)
-    assert (finding.verdict, finding.names, finding.leads) == ("described", (), (parts.partition("+")[0],))
+    leads = () if ":" in parts else (parts.partition("+")[0],)
+    assert (finding.verdict, finding.names, finding.leads) == ("described", (), leads)
