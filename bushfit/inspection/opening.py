@@ -1,7 +1,6 @@
 """Inspection of a test file: its test, the keys of its table in a campaign, contents and oddities."""
 
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import fields
 from itertools import chain
 from pathlib import Path
@@ -30,13 +29,11 @@ from bushfit.reading.stated import LoopFile, SweepFile
 from bushfit.reading.sweeps import read_sweep
 from bushfit.reading.table import Table
 from bushfit.reduction.programme import split_record
-from bushfit.reduction.steps import steady_sines
+from bushfit.reduction.steps import distinct_points, is_stepped_sine, steady_sines
 from bushfit.validation import validate_tables
 
 #: [Hz] Frequency above which a motion in steps is a stepped sine; chosen: quasi-static loops are slower.
 _QUASI_STATIC = 1.0
-#: Share of a record above which two cycles of one frequency are a test; chosen: steps take less between each other.
-_SLOW_SHARE = 0.1
 #: Distance of a stated preload from the mean of a loop, relative to its range, from which they contradict each other;
 #: chosen: rubber relaxes by less.
 _FAR_FROM_MEAN = 0.5
@@ -214,19 +211,16 @@ def classify_recording(measured: Loop, labels: Mapping[str, Labels], test: LoopF
     Returns:
         Kind of the recording, with its facts and oddities.
     """
-    steps = steady_sines(measured)
-    points = {(round(np.log(frequency), 2), round(np.log(amplitude), 1)) for frequency, amplitude in steps}
-    fastest = max((frequency for frequency, _ in steps), default=0.0)
+    sines, cycles = steady_sines(measured)
+    fastest = max((sine.frequency for sine in sines), default=0.0)
     is_fast = fastest > _QUASI_STATIC
-    if len(points) > 1 and is_fast:
-        with suppress(MeasurementError):  # no steady sine after all
-            slow = [frequency for frequency, _ in steps if 2.0 / frequency > _SLOW_SHARE * np.ptp(measured.time)]
-            return "history", describe_history(measured, labels, slow)
+    if is_fast and is_stepped_sine(measured, sines, cycles):
+        return "history", describe_history(measured, labels)
     loops = split_record(measured, test)
     if len(loops) > 1:
         return "loop", describe_programme(measured, loops, labels)
     facts, odd = describe_loop(loops[0], labels)
-    if is_fast or len(points) > 1:
+    if is_fast or len(distinct_points(sines)) > 1:
         description = f"at {fastest:.3g} Hz" if is_fast else "of several amplitudes"
         sentence = f"a motion {description} is read as a loop; if it is a stepped sine, run bushfit reduce"
         odd.append(Caveat("read_as_loop", sentence))

@@ -16,7 +16,14 @@ from bushfit.reading.measurement import Floats, Loop, RecordPart
 from bushfit.reading.stated import LoopFile
 from bushfit.reduction.cycles import lone_outliers, resumes_in_phase, shifted_difference, stretches
 from bushfit.reduction.harmonics import cycle_harmonics
-from bushfit.reduction.turning_points import Integers, middle_crossings, motion_turns, moving_parts, prominent_turns
+from bushfit.reduction.turning_points import (
+    Integers,
+    middle_crossings,
+    motion_turns,
+    moving_parts,
+    prominent_turns,
+    stroke_middles,
+)
 
 #: Rows that are enough to find the cycles.
 ENOUGH_ROWS = 200_000
@@ -26,10 +33,15 @@ THREE_CYCLES = 2.95
 SAME_MOTION = 0.05
 #: Largest relative difference of two equal half cycles, or of the periods within one part; chosen: rigs are more even.
 _SAME_RATE = 0.08
-#: Share of the range of a steady part from which on a stroke is similar to its strokes.
-_SIMILAR = 0.7
+#: Share of the range of a steady part from which on a stroke is similar to its strokes; smallest share of these strokes
+#: in steady parts: in a swept, modulated or superposed motion, few successive cycles are equal.
+_SIMILAR, _LEAST_COVERED = 0.7, 0.5
+#: Largest scatter of the cycles of a loop, relative to their amplitude; chosen: a larger one spans several levels.
+_MOST_SCATTER = 0.05
 #: Largest relative difference of the ranges of two parts with one amplitude; chosen: rigs step by more.
 _SAME_AMPLITUDE = 0.08
+#: Smallest number of cycles of a steady part; chosen: a single cycle has no equal one.
+_FEWEST_CYCLES = 1.4
 #: Distance from an end of the record, relative to a cycle, up to which a part is extended to that end.
 _AT_END = 0.1
 #: Smallest reported softening: absolute, and over the loss factor for a part after other cycles and a part from rest;
@@ -131,12 +143,14 @@ def steady_spans(loop: Loop, time: Floats, motion: Floats) -> list[SteadySpan]:
     if not spans and len(parts) > 1:  # rests that belong to a wave, or one cycle between them
         spans = _single_cycles(parts, noise) or _spans_of_part(time, motion, turns, noise)
     inner = np.abs(np.diff(motion[turns]))[1:-1]
-    periods = time[turns[3:-1]] - time[turns[1:-3]]
-    changes = [float(np.ptp(np.log(values))) for values in (inner, periods) if values.size]
-    # no rig misses its amplitude or rate by a third
-    if inner.size >= 4 and (_is_modulated(spans, inner) if spans else max(changes) > 0.3):
+    similar = inner > _SIMILAR * min((span.range for span in spans), default=0.0)
+    if inner.size < 4 or 2.0 * sum(span.cycles for span in spans) > _LEAST_COVERED * np.count_nonzero(similar):
+        return spans
+    begins = middle_crossings(time, motion, turns, stroke_middles(motion[turns]))[1:-1]
+    if _scatter(begins, inner) > _MOST_SCATTER:
         unit, factor = loop.direction.display.displacement
         low, high = factor * inner.min() / 2.0, factor * inner.max() / 2.0
+        periods = time[turns[3:-1]] - time[turns[1:-3]]
         raise NoTestError(
             "no part of the record is a loop",
             file=loop.source.file if loop.source else loop.name,
@@ -146,21 +160,28 @@ def steady_spans(loop: Loop, time: Floats, motion: Floats) -> list[SteadySpan]:
             expected="at least two cycles of one amplitude and rate",
             hint="record five cycles of each amplitude; for a road load, use bushfit respond or [[validation]]",
         )
-    return spans
+    return []
 
 
-def _is_modulated(spans: Sequence[SteadySpan], strokes: Floats) -> bool:
-    """Return True if alike parts of a motion hold less than half of its strokes: beats, or a sine on a slow motion.
+def _scatter(begins: Floats, sizes: Floats) -> float:
+    """Root mean square deviation of the cycles of a motion from equal cycles, relative to their amplitude.
+
+    Upward and downward strokes may differ from each other.
 
     Args:
-        spans: parts of constant amplitude and rate.
-        strokes: ranges of all strokes of the record [m or rad], (n,).
+        begins: times at which successive strokes cross their middle, (n,), in any unit.
+        sizes: ranges of these strokes, (n,), in any unit.
+
+    Notes:
+        To first order, its square is the share of the variance of the rows that the mean cycle leaves: the variance of
+        the phases [rad] at which strokes begin, plus that of the logarithms of their ranges.
     """
-    if len(spans) == 1 or not all(span.is_like(spans[0]) for span in spans[1:]):
-        return False
-    similar = strokes[strokes > _SIMILAR * spans[0].range]
-    is_uneven = float(np.ptp(np.quantile(similar, (0.1, 0.9)))) > _SAME_AMPLITUDE * spans[0].range
-    return is_uneven and 2.0 * sum(span.cycles for span in spans) < 0.5 * similar.size
+    number = np.arange(begins.size)
+    columns = np.stack((np.ones(number.size), number % 2, number)).T
+    course = np.linalg.lstsq(columns, begins, rcond=None)[0]
+    log_sizes, of_senses = np.log(sizes), columns[:, :2]
+    deviations = log_sizes - of_senses @ np.linalg.lstsq(of_senses, log_sizes, rcond=None)[0]
+    return float(np.hypot(np.std(begins - columns @ course) * np.pi / course[2], np.std(deviations)))
 
 
 def _single_cycles(parts: Sequence[tuple[Floats, Floats, Integers]], noise: float) -> list[SteadySpan]:
@@ -203,9 +224,9 @@ def _spans_of_part(time: Floats, motion: Floats, turns: Integers, noise: float) 
     for strokes in _alike_runs(size, same_size):
         halves = np.diff(across[strokes])
         for run in _alike_runs(halves, _SAME_RATE * halves):
-            if np.ptp(np.log(halves[run][1:] + halves[run][:-1])) > _SAME_RATE:
-                continue  # a swept sine, or two neighbouring rates
             first, last = strokes.start + run.start, strokes.start + run.stop
+            if _scatter(across[first : last + 1], size[first : last + 1]) > _MOST_SCATTER:
+                continue  # a swept sine, or two neighbouring rates
             begin, end = float(across[first]), float(across[last])
             period, stroke = 2.0 * (end - begin) / (last - first), float(np.median(size[first : last + 1]))
             span, previous = SteadySpan(begin, end, period, stroke), spans[-1] if spans else None
@@ -221,7 +242,8 @@ def _spans_of_part(time: Floats, motion: Floats, turns: Integers, noise: float) 
         return []
     before = [float(time[0]), *(span.end for span in spans[:-1])]
     after = [*(span.begin for span in spans[1:]), float(time[-1])]
-    return [_extend_span(span, time, motion, *limits) for span, *limits in zip(spans, before, after, strict=True)]
+    extended = [_extend_span(span, time, motion, *ends) for span, *ends in zip(spans, before, after, strict=True)]
+    return [span for span in extended if span.cycles > _FEWEST_CYCLES]
 
 
 def _alike_runs(values: Floats, reach: Floats) -> Iterator[slice]:

@@ -8,6 +8,7 @@ from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import count
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +29,14 @@ from bushfit.reduction.cycles import (
 from bushfit.reduction.harmonics import HarmonicFit
 from bushfit.reduction.result import Reduction, SkippedStretch, Step
 
+#: Smallest number of steady cycles of an operating point.
+FEWEST_CYCLES = 3
+#: Share of a record above which two cycles of one frequency are a test; chosen: steps take less between each other.
+_SLOW_SHARE = 0.1
+#: [ln] Largest difference of the frequency of cycles from that of their step.
+_SAME_RATE = 0.1
+#: Smallest ratio of the largest step to the range of its record; chosen: steps beside a larger motion are not the test.
+_SMALLEST_LEVEL = 0.6
 #: Smallest number of rows per cycle for an operating point; chosen: drift and fundamental have five unknowns.
 _FEWEST_ROWS_PER_CYCLE = 5.0
 #: Largest relative difference of equal frequencies; chosen: rigs are far more accurate, and frequency steps larger.
@@ -44,7 +53,7 @@ _LEAST_MOTION = 0.5
 _CHANGING = "the frequency or amplitude changes all the time"
 
 
-def reduce(histories: Sequence[Loop], *, fewest_cycles: int = 3, levels: Sequence[float] = ()) -> Reduction:
+def reduce(histories: Sequence[Loop], *, fewest_cycles: int = FEWEST_CYCLES, levels: Sequence[float] = ()) -> Reduction:
     """Find the steps of raw histories and reduce each to one operating point.
 
     Args:
@@ -78,24 +87,72 @@ def reduce(histories: Sequence[Loop], *, fewest_cycles: int = 3, levels: Sequenc
     return Reduction(direction, tuple(group_steps(steps, levels, direction)), tuple(skipped), outliers)
 
 
-def steady_sines(history: Loop) -> list[tuple[float, float]]:
-    """Find the steady stretches of a history, to recognise a stepped sine, without computing operating points.
+class SteadySine(NamedTuple):
+    """Stretch of a record with a steady sine: frequency [Hz], zero-to-peak amplitude [m or rad], number of cycles."""
+
+    frequency: float
+    amplitude: float
+    cycles: int
+
+
+def steady_sines(history: Loop) -> tuple[list[SteadySine], int]:
+    """Find the steady stretches of a history without computing operating points.
+
+    Returns:
+        Stretches of two cycles or more, and the number of all cycles of the history.
+    """
+    cycles = Cycles.find(history.time, history.displacement)
+    sines = []
+    for run in cycles.runs():
+        edges, amplitude = cycles.edges[run.start : run.stop + 1], cycles.range[run] / 2.0
+        for part in _steady_parts(edges, np.log(amplitude), FEWEST_CYCLES):
+            if (count := part.stop - part.start) > 1:
+                frequency = count / float(edges[part.stop] - edges[part.start])
+                sines.append(SteadySine(frequency, float(np.median(amplitude[part])), count))
+    return sines, cycles.range.size
+
+
+def distinct_points(sines: Sequence[SteadySine]) -> set[tuple[float, float]]:
+    """Distinct operating points of steady sines: natural logs of frequency and amplitude, rounded."""
+    return {(round(np.log(sine.frequency), 2), round(np.log(sine.amplitude), 1)) for sine in sines}
+
+
+def is_stepped_sine(history: Loop, sines: Sequence[SteadySine], cycles: int) -> bool:
+    """Test whether the steady stretches of a record are the steps of a stepped sine.
 
     Args:
         history: record of time, displacement and force.
+        sines: steady stretches of the record, from `steady_sines`.
+        cycles: number of all cycles of the record.
 
     Returns:
-        Frequency [Hz] and approximate zero-to-peak amplitude [m or rad] of each stretch of two cycles or more.
+        True if stretches with enough cycles for an operating point give several points, and hold most of the cycles,
+        the largest motion, and each frequency whose cycles take much of the record.
     """
-    cycles = Cycles.find(history.time, history.displacement)
-    found = []
-    for run in cycles.runs():
-        edges, amplitude = cycles.edges[run.start : run.stop + 1], cycles.range[run] / 2.0
-        for part in steady_pieces(edges, np.log(amplitude)):
-            if (count := part.stop - part.start) > 1:
-                frequency = count / float(edges[part.stop] - edges[part.start])
-                found.append((frequency, float(np.median(amplitude[part]))))
-    return found
+    steps = [sine for sine in sines if sine.cycles >= FEWEST_CYCLES]
+    if len(distinct_points(steps)) < 2 or 2 * sum(step.cycles for step in steps) < cycles:
+        return False
+    frequencies, levels, _ = np.array(steps).T
+    slow = [sine.frequency for sine in sines if 2.0 / sine.frequency > _SLOW_SHARE * np.ptp(history.time)]
+    has_slow = all(np.abs(np.log(frequencies / frequency)).min() < _SAME_RATE for frequency in slow)
+    return has_slow and levels.max() > _SMALLEST_LEVEL * np.ptp(history.displacement) / 2.0
+
+
+def _steady_parts(edges: Floats, log_amplitude: Floats, fewest: int) -> list[slice]:
+    """Split a run of cycles into steady parts, as slices of its cycles; empty if its frequency sweeps continuously.
+
+    Args:
+        edges: times of the upward crossings [s], (m + 1,).
+        log_amplitude: natural log of the amplitude of each cycle, (m,).
+        fewest: smallest number of cycles of a step; if no part has as many, all but the cycles in which the motion
+            starts and stops are one part.
+    """
+    parts = steady_pieces(edges, log_amplitude)
+    if keeps_changing(edges, parts):
+        return []
+    if max(part.stop - part.start for part in parts) < fewest <= edges.size - 3:
+        return [slice(1, edges.size - 2)]
+    return parts
 
 
 def find_steps(history: Loop, fewest: int) -> tuple[list[Step], list[SkippedStretch]]:
@@ -114,12 +171,9 @@ def find_steps(history: Loop, fewest: int) -> tuple[list[Step], list[SkippedStre
     for run in cycles.runs():
         motion, force = cycles.fundamentals(run, history.displacement, history.force)
         edges = cycles.edges[run.start : run.stop + 1]
-        parts = steady_pieces(edges, np.log(np.abs(motion)))
-        if keeps_changing(edges, parts):
+        parts = _steady_parts(edges, np.log(np.abs(motion)), fewest)
+        if not parts:
             skipped.append(SkippedStretch(history.name, float(edges[0]), float(edges[-1]), _CHANGING, True))
-            continue
-        if max(part.stop - part.start for part in parts) < fewest <= edges.size - 3:
-            parts = [slice(1, edges.size - 2)]  # without the cycles in which the motion starts and stops
         for part in parts:
             inside = slice(run.start + part.start, run.start + part.stop)
             start, end, count = float(edges[part.start]), float(edges[part.stop]), part.stop - part.start

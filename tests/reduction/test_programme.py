@@ -122,6 +122,11 @@ UNSTEADY = {
     "narrow sweep": np.sin(2.0 * np.pi * (0.9 * MINUTE + 0.1 / 60.0 * MINUTE**2)),
     "narrower sweep": np.sin(2.0 * np.pi * (0.98 * MINUTE + 0.02 / 60.0 * MINUTE**2)),
     "modulated": (1.0 + 0.4 * np.sin(2.0 * np.pi * 0.05 * MINUTE)) * np.sin(2.0 * np.pi * MINUTE),
+    "modulated by a tenth": (1.0 + 0.1 * np.sin(2.0 * np.pi * 0.2 * MINUTE)) * np.sin(2.0 * np.pi * MINUTE),
+    "cycles of rising frequency": np.concatenate(
+        [np.sin(2.0 * np.pi * f * np.arange(0.0, 1.0 / f, STEP)) for f in np.arange(0.5, 1.25, 0.1)]
+    ),
+    "two equal sines": np.sin(2.0 * np.pi * 0.1 * MINUTE) + np.sin(2.0 * np.pi * MINUTE),
     "two sines": np.sin(2.0 * np.pi * 0.1 * MINUTE) + 0.3 * np.sin(2.0 * np.pi * 5.0 * MINUTE),
 }
 
