@@ -28,6 +28,7 @@ from bushfit.reading.instruments import word_for_part
 from bushfit.reading.labelled import same_text
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.levels import split_conditions
+from bushfit.reading.lines import is_summary_row
 from bushfit.reading.measurement import FEWEST_LOOP_ROWS, Loop, Sweep
 from bushfit.reading.names import NO_LABELS, Labels, labels_above, labels_in_names
 from bushfit.reading.parts import open_file
@@ -172,6 +173,10 @@ def split_sheets(file: TestSource, test_options: Mapping[str, Any]) -> tuple[lis
         except BushfitError:  # which the inspection of the test reports
             pass
         tests.append(part)
+    means = [test for test in tests if test.sheet and is_summary_row([test.sheet])]
+    if len(means) < len(tests):
+        tests = [test for test in tests if test not in means]
+        left_out += [Caveat("left_out", "a summary of the other sheets, by its name").about(test) for test in means]
     if not tests and file.is_named:  # the error of the whole file says why
         return whole, []
     if without and len(parts) > 1:

@@ -10,7 +10,7 @@ from typing import Any
 
 from bushfit.campaign.bodies import SpecimenSettings
 from bushfit.errors import BushfitError, NoTestError, ResonanceTestError, quote_path
-from bushfit.geometry import STRAINING, TRANSLATION, Direction, Motion, Place, Specimen
+from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Direction, Motion, Place, Specimen
 from bushfit.reading.finding import find_table
 from bushfit.reading.headers import LOOP_COLUMNS, RESONANCE_COLUMNS, SWEEP_COLUMNS, Vocabulary
 from bushfit.reading.labelled import Rows
@@ -18,10 +18,11 @@ from bushfit.reading.layout import FileFormat
 from bushfit.reading.names import direction_of_file, named_direction
 from bushfit.reading.parts import OpenedFile, open_file
 from bushfit.reading.resonance import is_resonance
-from bushfit.reading.roles import PAIRS, of_motion
+from bushfit.reading.roles import PAIRS, of_motion, si_unit
 from bushfit.reading.si_columns import columns_key
 from bushfit.reading.stiffness import hint_for_convertible_columns, refuse_ambiguous_damping
 from bushfit.reading.table import Table
+from bushfit.units import is_compatible
 from bushfit.validation import validate_tables
 
 #: Keys of [[specimens]] for the sizes of a block in shear.
@@ -70,7 +71,16 @@ def recognize_table(file: Path, test_options: Mapping[str, Any]) -> tuple[Table,
             refuse_ambiguous_damping(table)
     if complete:  # a sweep before a loop, and columns of a stiffness or modulus before the amplitude of a force
         direct = [pair for pair in PAIRS if pair[0] != "force_amplitude"]
-        return min(complete, key=lambda one: (not one[1], not any(set(pair) <= {*one[0].roles} for pair in direct)))
+        ranks = [
+            (
+                not is_sweep,
+                not any({*pair} <= {*table.roles} for pair in direct),
+                count_other_units(table),
+                -len(table.roles),
+            )
+            for table, is_sweep in complete
+        ]
+        return complete[ranks.index(min(ranks))]
     resonance: Table | None = None
     with suppress(BushfitError):  # whose columns are not those of a resonance test
         resonance = open_table(content, RESONANCE_COLUMNS, test_options)
@@ -99,6 +109,16 @@ def recognize_table(file: Path, test_options: Mapping[str, Any]) -> tuple[Table,
         expected="time, displacement and force; or frequency, amplitude, and stiffness with loss factor or phase",
         hint=advice
         or f"correct the header, or name the column: {_LOSS_COLUMN if lacking == 'loss_factor' else column}",
+    )
+
+
+def count_other_units(table: Table) -> int:
+    """Number of columns whose unit does not fit the kind of motion of the table, such as a modulus in MPa."""
+    motions = (STRAINING,) if table.motion is STRAINING else (TRANSLATION, ROTATION)
+    expected = {role: [si_unit(role, motion) for motion in motions] for role in table.roles}
+    return sum(
+        column.unit is not None and not any(is_compatible(column.unit, si) for si in expected[role])
+        for role, column in table.roles.items()
     )
 
 

@@ -1,11 +1,11 @@
-"""Combine the blocks of a table (one below the other, side by side, or transposed) into one long table."""
+"""Combine the blocks of a table (one below the other, or side by side) into one long table."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from dataclasses import replace
-from itertools import groupby, islice, zip_longest
+from itertools import groupby, islice
 from typing import NamedTuple
 
 from bushfit import units
@@ -13,10 +13,9 @@ from bushfit.reading.block_labels import is_of_block, label_columns
 from bushfit.reading.headers import WORDS, Vocabulary, plain, split_unit, without_mean
 from bushfit.reading.layout import Layout
 from bushfit.reading.lines import WITH_UNIT, Line, is_comment, is_row, is_summary_row, is_units_row
-from bushfit.reading.measurement import FEWEST_LOOP_ROWS
 from bushfit.reading.names import NO_LABELS, labels_above
 from bushfit.reading.numerals import is_like_number, plainest_value
-from bushfit.reading.roles import PAIRS, is_test
+from bushfit.reading.roles import PAIRS
 from bushfit.reading.source import Channels, RowSource, Sheet, Text, cells_of
 
 #: Largest text that is searched for blocks without their own headers [bytes]; chosen: some 100,000 rows.
@@ -33,8 +32,6 @@ _COMPLEX = re.compile(
 _NAME_OF_SIDE = re.compile(r"(?<![^\s_])(?=((?:[^\W\d_][^\W_]*[\s_])?#?\d|[^\W\d_][^\W_]*)(?![^\s_]))")
 #: Words for a set point, a deviation or a corrected value, which name no block.
 _STATISTICS = frozenset(map(plain, (*WORDS["qualifiers"]["not_measured"], *WORDS["qualifiers"]["processed"])))
-#: Level of an amplitude in the name of a quantity: "K* 0.1 mm [N/mm]".
-_LEVEL = re.compile(r"(?<![\w.,])\d+(?:[.,]\d+)?\s?(?:[^\W\d]{1,3}|%)(?![^\W_])")
 #: First rows that are searched for complex numbers and units; chosen: room for remarks.
 _FIRST = 8
 
@@ -134,48 +131,6 @@ def combined(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> tuple
         line for line in head if not (line.number in of_titles if sides else is_of_block(line, [*added], vocabulary))
     ]
     return _with_plain_cells(Sheet(source.sheet or "", content, above=above, numbers=numbers), layout)
-
-
-def exchange_rows(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> Sheet | None:
-    """Exchange rows and columns of tables with a row for each quantity, such as "f [Hz]; 1; 2; 5" or "f; Hz; 1; 2; 5".
-
-    Args:
-        source: lines or rows of the file.
-        layout: layout of the file if it is read as a table with a column for each quantity.
-        vocabulary: known column names.
-
-    Returns:
-        Sheet with the exchanged tables, below the lines above each; None if there is no such table.
-    """
-    lines = [Line(line.number, list(map(str, cells_of(line, layout.delimiter)))) for line in source.head()]
-    names = [next(filter(None, map(str, line.content)), "") for line in lines]
-    if len(vocabulary.roles([_LEVEL.sub("", name) for name in names if not is_like_number(name)])) < 2:
-        return None
-
-    def count_texts(line: Line) -> int | None:
-        """Number of texts in front of the numbers of a row that has both, and nothing behind; None for other lines."""
-        first = next((index for index, cell in enumerate(line.content) if is_like_number(str(cell))), 0)
-        numbers = [str(cell) for cell in line.content[first:] if cell != ""]
-        is_named = any(line.content[:first]) and len(line.content) - first > 2 and all(map(is_like_number, numbers))
-        return first if is_named else None
-
-    content, is_exchanged = list[Sequence[str | float]](), False
-    for above, rows in find_segments(lines, count_texts):
-        table, group = list[list[str]](), ""
-        for line in rows:
-            texts, numbers = list(map(str, line.content)), list(map(str, line.content[count_texts(line) :]))
-            texts = texts[: len(texts) - len(numbers)]
-            group = texts[0] or group
-            words = sorted(filter(None, (group, *texts[1:])), key=lambda text: bool(_LEVEL.fullmatch(text)))
-            table.append([" ".join(f"[{word}]" if units.is_unit(word) else word for word in words), *numbers])
-        plain_names = [_LEVEL.sub("", cells[0]) for cells in table]
-        roles = vocabulary.roles(plain_names)
-        is_record = is_test(roles) and len(table[0]) > FEWEST_LOOP_ROWS  # more than a summary of its channels
-        is_table = is_record or ("frequency" in roles and len(roles) > 2)
-        is_exchanged |= is_table
-        content += [line.content for line in above]
-        content += zip_longest(*table, fillvalue="") if is_table else [line.content for line in rows]
-    return Sheet(source.sheet or "", content) if is_exchanged else None
 
 
 def _is_one_block(source: Text, layout: Layout) -> bool:

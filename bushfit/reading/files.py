@@ -2,8 +2,10 @@
 
 import codecs
 import hashlib
+import html
 import io
 import re
+import unicodedata
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
@@ -40,6 +42,15 @@ _KNOWN_WORDS = frozenset(
     for word in words
     if len(word) > 1 and not word.isascii()
 )
+#: Cell that is written as the formula of its text, as in ="0.1"; line that is quoted as a whole.
+_QUOTED_CELL = re.compile(r'"?="+([^"\n]*)"+')
+_QUOTED_LINE = re.compile(r'^"([^"\n]*[;,\t][^"\n]*)"(?=[;,]*\r?$)', re.MULTILINE)
+#: HTML entity such as &micro; and characters of UTF-8 that were decoded as cp1252.
+_ENTITY = re.compile(r"&(?:#\d{1,5}|[A-Za-z]{2,8}\d?);")
+_READ_AS_CP1252 = re.compile(r"[Â-ß][^\x00-\x7f]|[à-ï][^\x00-\x7f]{2}")
+#: Characters without a width; characters of full or half width, and units of one character, such as mm and Hz.
+_INVISIBLE = re.compile("[\u200b-\u200f\u2060\ufeff]")
+_OTHER_WIDTH = re.compile("[\uff01-\uffee\u3300-\u33ff]+")
 #: Run of non-ASCII bytes.
 _HIGH_RUN = re.compile(rb"[\x80-\xff]+")
 #: Two bytes of GB2312: its punctuation and its 3755 commonest characters. Western accents make few such pairs.
@@ -172,12 +183,12 @@ def to_utf8(data: bytes, file: Path, stated_encoding: str | None = None) -> tupl
         MeasurementError: the file is not text, or not in the given encoding.
     """
     if stated_encoding is None and data.isascii() and 0 not in data:
-        return data, "utf-8"
+        return _plain_bytes(data), "utf-8"
     encoding = stated_encoding or detect(data)
     if encoding in ("utf-8", "utf-8-sig"):
         without_mark = data.removeprefix(codecs.BOM_UTF8)
         if (bad := not_utf8(without_mark)) is None:
-            return without_mark, "utf-8"
+            return _plain_bytes(without_mark), "utf-8"
         raise _undecodable(data, file, bad, "utf-8")
     raw = io.BytesIO(data)
     try:
@@ -194,7 +205,40 @@ def to_utf8(data: bytes, file: Path, stated_encoding: str | None = None) -> tupl
             found=f'"{stated_encoding}"',
             expected='a name such as "utf-8", "utf-16", "cp1252", "latin-1" or "gb18030"',
         ) from None
-    return b"".join(parts).removeprefix(codecs.BOM_UTF8), encoding
+    return _plain_bytes(b"".join(parts).removeprefix(codecs.BOM_UTF8)), encoding
+
+
+def _plain_bytes(data: bytes) -> bytes:
+    """Apply `plain_text` to the lines of a text in UTF-8; to its first lines alone if the text is large."""
+    end = data.rfind(b"\n", 0, CHUNK_BYTES) + 1 if len(data) > CHUNK_BYTES else len(data)
+    return plain_text(data[:end].decode("utf-8")).encode("utf-8") + data[end:]
+
+
+def plain_text(text: str) -> str:
+    """Replace other spellings of the characters in a text or cell by the usual ones.
+
+    Letters and digits of full or half width become plain ones, and HTML entities the characters they stand for; UTF-8
+    that was read as cp1252 ("Âµ") is repaired, and quotation marks that keep a program from reading a cell or a whole
+    line, as in ="0.1", are dropped.
+    """
+    if '"' in text:
+        text = _QUOTED_CELL.sub(r'"\1"', text)
+        lines = _QUOTED_LINE.findall(text)
+        text = _QUOTED_LINE.sub(r"\1", text) if 2 * len(lines) > text.count("\n") else text
+    if "&" in text:
+        text = _ENTITY.sub(lambda match: html.unescape(match[0]), text)
+    if text.isascii():
+        return text
+    text = _READ_AS_CP1252.sub(_as_utf8, _INVISIBLE.sub("", text))
+    return _OTHER_WIDTH.sub(lambda match: unicodedata.normalize("NFKC", match[0]), text)
+
+
+def _as_utf8(match: re.Match[str]) -> str:
+    """Decode characters as UTF-8 that were decoded as cp1252; unchanged if they are not valid UTF-8."""
+    try:
+        return match[0].encode("cp1252").decode("utf-8")
+    except UnicodeError:
+        return match[0]
 
 
 def detect(data: bytes) -> str:

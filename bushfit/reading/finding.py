@@ -7,12 +7,13 @@ from pathlib import Path
 
 from bushfit.errors import MeasurementError
 from bushfit.geometry import TRANSLATION, Motion
-from bushfit.reading.blocks import combined, exchange_rows
+from bushfit.reading.blocks import combined
 from bushfit.reading.classification import classify
 from bushfit.reading.headers import ALL_COLUMNS, Vocabulary
 from bushfit.reading.labelled import Rows, select_rows
 from bushfit.reading.layout import DELIMITERS, FileFormat, Layout, find_layout
 from bushfit.reading.parts import OpenedFile, open_file
+from bushfit.reading.reshape import reshaped
 from bushfit.reading.roles import PAIRS, of_motion
 from bushfit.reading.source import RowSource, Sheet
 from bushfit.reading.table import Table
@@ -108,9 +109,8 @@ def _locate(
             for source in opened.parts:
                 mark = "" if isinstance(source, Sheet) else DELIMITERS.get(stated.delimiter or "")
                 layout = source.layout or find_layout(source.head(), vocabulary, mark, stated.header_line)
-                exchanged = None if stated.header_line else exchange_rows(source, layout, vocabulary)
-                if exchanged:
-                    source, layout = exchanged, find_layout(exchanged.head(), vocabulary, "")
+                if not stated.header_line and (long := reshaped(source, layout, vocabulary)):
+                    source, layout = long, find_layout(long.head(), vocabulary, "")
                 located.append(((source, layout), combined(source, layout, vocabulary)))
         except csv.Error as error:
             raise MeasurementError("the table cannot be read", file=opened.file, found=str(error)) from error

@@ -96,12 +96,20 @@ def _in_struct(path: str, content: Mapping[str, Any]) -> Iterator[Group]:
     inner = dict[str, Mapping[str, Any]]()
     for name, value in fields.items():
         place = f"{path}.{name}" if path else name
+        structs = [one for one in (value if isinstance(value, list) else [value]) if isinstance(one, Mapping)]
+        named = [(one, label) for one in structs if "Data" in one and (label := one.get("Name", one.get("SignalName")))]
+        numbers = {key: [one.get(key) for one in structs] for key in structs[0]} if len(structs) > 1 else {}
+        numbers = {key: column for key, column in numbers.items() if all(isinstance(x, float | int) for x in column)}
         if isinstance(value, Mapping) and {"x_values", "y_values"} <= value.keys():
             channels.append(_waveform(name, value))
+        elif named:
+            channels += [Channel(str(label), np.asarray(one["Data"]), str(one.get("Unit", ""))) for one, label in named]
         elif isinstance(value, Mapping):
             inner[place] = value
-        elif isinstance(value, list):
-            inner |= {f"{place}({n})": one for n, one in enumerate(value, start=1) if isinstance(one, Mapping)}
+        elif structs and len(numbers) == len(structs[0]):  # a struct for each row
+            inner[place] = {key: np.array(column, dtype=float) for key, column in numbers.items()}
+        else:
+            inner |= {f"{place}({n})": one for n, one in enumerate(structs, start=1)}
     if len(levels) == 1:
         remaining = [one for one in channels if one is not levels[0]]
         for n, level in enumerate(levels[0].values):

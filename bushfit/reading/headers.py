@@ -139,7 +139,7 @@ _SPELLINGS: dict[int, int | str] = {
 #: End of a name before a unit without brackets: "force_N", "Kraft in N", "F / kN", "load, N".
 _NAME_END = re.compile(r"\s+in\s+|\s*/\s*|\s*,\s*|\s+|_")
 #: Newton per a length in a name without capitals: "n_per_mm"; and the word before a part of such a unit.
-_PER_OF_NEWTON, _PER = re.compile(r"(?<![^\W_])n[ _]per[ _]"), re.compile(r"(?<![^\W_])per$")
+_PER_OF_NEWTON, _PER = re.compile(r"(?<![^\W_])(k?)n[ _]per[ _]"), re.compile(r"(?<![^\W_])per$")
 
 
 @dataclass(frozen=True)
@@ -384,7 +384,7 @@ def _splits(text: str) -> Iterator[tuple[str, str | None, bool]]:
     yield name, unit, True
     if unit is None:
         for end in reversed(list(_NAME_END.finditer(name))):
-            text = _PER_OF_NEWTON.sub("N/", name[end.end() :].strip(" _"))
+            text = _PER_OF_NEWTON.sub(r"\1N/", name[end.end() :].strip(" _"))
             text = "N" if text == "n" and end.start() > 1 else text  # "force_n" in names without capitals
             if _PER.search(name[: end.start()]):
                 continue  # a part of a unit such as N_per_mm

@@ -48,6 +48,12 @@ _NUMBERED = re.compile(r"#\s?\d+\b")
 _BLANK_BEFORE_BRACKET = re.compile(r" {1,8}(?=[\[(])")
 #: Wide gap, which is shortened to two blanks.
 _WIDE_GAP = re.compile(" {3,}")
+#: Name of a column in a list of names above a table: "Sig1 Time (s)", "Column 2: Weg [mm]", "# 3 Force [N]".
+_LISTED_NAME = re.compile(
+    r"[@#%*\s]*(?:(?:(?:sig|signal|col|column|ch|chan|channel|spalte|kanal)[\s.]*)?(?P<number>\d{1,3})\s*[:=.)\t ]\s*)?"
+    r"(?P<name>[^\W\d].*?)\s*",
+    re.IGNORECASE,
+)
 #: Gap between columns whose headers contain single blanks.
 _COLUMN_GAP = re.compile(r"\t|\s{2,}")
 #: Cell of a line whose columns are separated by wide gaps.
@@ -156,6 +162,10 @@ def find_layout(
             return replace(layout, notes=(*layout.notes, note))
     best = max(candidates, key=lambda candidate: candidate[0], default=None)
     if best is None:
+        rows = [split(line.content, mark) for line in lines[end : end + 1] for mark in delimiters]
+        if header_line is None and (listed := _listed_names(lines[:end], rows, vocabulary)):
+            layout = _layout(lines, vocabulary, listed[0], delimiters[listed[1]], listed[2])
+            return replace(layout, described_line=lines[end - 1].number)
         return _layout(lines, vocabulary, *_likeliest(lines, before, end, delimiters))
     # the same header above a block of one or two rows is the first
     _, last, delimiter, headers = best
@@ -238,6 +248,32 @@ def _first_rows(lines: Sequence[Line], delimiters: Sequence[str]) -> tuple[int, 
     return len(lines), delimiters
 
 
+def _listed_names(
+    lines: Sequence[Line], rows: Sequence[Sequence[str]], vocabulary: Vocabulary
+) -> tuple[int, int, list[str]] | None:
+    """Find the names of columns that the lines above a table list, one on each line, such as "Channel 1: Time [s]".
+
+    Args:
+        lines: lines above the table.
+        rows: cells of its first row, for each possible delimiter.
+        vocabulary: known column names.
+
+    Returns:
+        Index of the last line of the list, index of the delimiter that gives as many cells as there are names, and the
+        names; None without such a list.
+    """
+    matches = [_LISTED_NAME.fullmatch(line.text) for line in lines]
+    listed = [match for match in matches if match and match["number"]]
+    if not listed:
+        listed = [match for match in matches if match and vocabulary.heading(match["name"])]
+    counts = [int(match["number"]) for match in listed if match["number"]]
+    names = [re.sub(r"\s{2,}|\t", " ", match["name"]) for match in listed]
+    if len(vocabulary.roles(names)) < 2 or counts not in ([], *(list(range(n, n + len(names))) for n in (0, 1))):
+        return None
+    last = matches.index(listed[-1])
+    return next(((last, index, names) for index, row in enumerate(rows) if len(row) == len(names)), None)
+
+
 def _likeliest(
     lines: Sequence[Line], before: Sequence[int], end: int, delimiters: Sequence[str]
 ) -> tuple[int, str, list[str]]:
@@ -297,8 +333,11 @@ def _layout(
         counted = [f"{number:g}" for number in map(plainest_value, below[0][1])] if below and len(headers) > 2 else []
         described = below[:1] if counted == [str(n) for n in range(1, len(headers) + 1)] else []
     of_units = [(line, cells) for line, cells in (*described, *above) if _is_labelled_units_row(cells, len(headers))]
+    directly_above = split(lines[index - 1].content, delimiter) if index else []
     if of_units:
         units_line, row = of_units[0][0], ["", *of_units[0][1][1:], *row][: len(headers)]
+    elif len(directly_above) == len(headers) and all(directly_above) and is_units_row(directly_above):
+        row = [cell.strip("[]() ") for cell in directly_above]
     elif below:
         cells = [cell.strip("[]() ") for cell in below[0][1]]
         if delimiter == " " and isinstance(text := next(_below(lines, index, delimiter)).content, str):

@@ -24,6 +24,8 @@ _CLOCK = re.compile(
 )
 #: Date before a clock: 2026-11-26T, 26.11.2026, 11/26/2026, 26 11 2026.
 _DATE = re.compile(r"(?P<a>\d{1,4})[-./\s]+(?P<b>\d{1,2})[-./,\s]+(?P<c>\d{1,4})(?:[T_\s,-]+|$)")
+#: Date behind a clock: 20:07:10 26.11.2026.
+_DATE_LAST = re.compile(r"(\d+:.+?)\s+(\d{1,4}[-./]\d{1,2}[-./]\d{2,4})")
 #: Date and clock without separators, or with hyphens alone: 20261126 200710, 2026-11-26_20-07-10.
 _COMPACT = re.compile(r"(\d{4})-?(\d\d)-?(\d\d)[T\s_-]?(\d\d)[-_]?(\d\d)[-_]?(\d\d)(?![\d:])")
 #: Number of a month by the first three letters of its name.
@@ -48,6 +50,7 @@ def clock(text: str) -> float | None:
     """
     text = _COMPACT.sub(r"\1-\2-\3 \4:\5:\6", _ZONE.sub("", text.strip()))
     text = _MONTH.sub(lambda month: str(_MONTHS[month[1].lower()]), text)
+    text = _DATE_LAST.sub(r"\2 \1", text)
     date, days = _DATE.match(text), 0.0
     if date:
         first, second, third = (int(part) for part in date.groups())

@@ -8,6 +8,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from bushfit.errors import MeasurementError
+from bushfit.reading.files import plain_text
 from bushfit.reading.source import Sheet
 
 #: Largest number of cells in all sheets, including empty ones between others; chosen: a full sheet of ten columns.
@@ -125,9 +126,10 @@ def _column_index(letters: str) -> int:
 def _row(cells: Sequence[object]) -> list[str | float]:
     """Convert the cells of a worksheet row to floats, or else to texts on one line, without empty cells at the end."""
     row: list[str | float] = [
-        float(cell) if isinstance(cell, int | float) and not isinstance(cell, bool) else " ".join(str(cell).split())
+        float(cell) if isinstance(cell, int | float) and not isinstance(cell, bool) else plain_text(str(cell))
         for cell in cells
     ]
+    row = [" ".join(cell.split()) if isinstance(cell, str) else cell for cell in row]
     while row and row[-1] == "":
         row.pop()
     return row

@@ -1,0 +1,165 @@
+"""Reshape tables without a column for each quantity into long tables.
+
+A quantity may have a row of its own ("f [Hz]; 1; 2; 5"), rows that name it in a column ("5 Hz; K*; 600; N/mm"), a block
+of its own below those of other quantities, or a sheet of its own.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from itertools import islice, zip_longest
+
+from bushfit import units
+from bushfit.reading.blocks import find_segments
+from bushfit.reading.headers import WORDS, Vocabulary, plain
+from bushfit.reading.layout import UNIT_NAMES, Layout
+from bushfit.reading.lines import Line, is_row
+from bushfit.reading.measurement import FEWEST_LOOP_ROWS
+from bushfit.reading.numerals import is_like_number
+from bushfit.reading.roles import is_test
+from bushfit.reading.source import Channels, RowSource, Sheet, cells_of
+
+#: Level of an amplitude in the name of a quantity: "K* 0.1 mm [N/mm]".
+_LEVEL = re.compile(r"(?<![\w.,])\d+(?:[.,]\d+)?\s?(?:[^\W\d]{1,3}|%)(?![^\W_])")
+#: Names of a column with the values of several quantities, which another column names.
+_VALUES = frozenset(map(plain, WORDS["rows_of"]["values"]))
+#: First rows that show whether a column names quantities; chosen: more than a test has channels.
+_FIRST_ROWS = 50
+
+
+def reshaped(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> Sheet | None:
+    """Reshape a table without a column for each quantity.
+
+    Args:
+        source: lines or rows of the file.
+        layout: layout of the file if it is read as a table with a column for each quantity.
+        vocabulary: known column names.
+
+    Returns:
+        Sheet with a column for each quantity, below the lines above the table; None if the table has one already.
+    """
+    if isinstance(source, Channels) or not layout.headers or layout.headerless:
+        return None
+    return (
+        _exchange_rows(source, layout, vocabulary)
+        or _spread_names(source, layout, vocabulary)
+        or _join_blocks(source, layout, vocabulary)
+    )
+
+
+def _spread_names(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> Sheet | None:
+    """Reshape a table in which one column names the quantity of each row, and another contains its value.
+
+    A third column may contain the units.
+    """
+    plain_headers = list(map(plain, layout.headers))
+    values = next((n for n, header in enumerate(plain_headers) if header in _VALUES), None)
+    unit = next((n for n, header in enumerate(plain_headers) if header in UNIT_NAMES), None)
+    if values is None:
+        return None
+    lines = source.lines(layout.lines_before_data)
+    first = [list(map(str, cells_of(line, layout.delimiter))) for line in islice(lines, _FIRST_ROWS)]
+    columns = [{row[n] for row in first if n < len(row)} for n in range(len(layout.headers))]
+    names = [
+        n for n, texts in enumerate(columns) if n not in (values, unit) and all(map(vocabulary.heading, texts or [""]))
+    ]
+    if len(names) != 1:
+        return None
+    width = len(layout.headers)
+    keys = [n for n in range(width) if n not in (names[0], values, unit)]
+    rows = list[tuple[int, list[str | float], str, str | float]]()
+    for line in source.lines(layout.lines_before_data):
+        cells = [*cells_of(line, layout.delimiter), *[""] * width]
+        name = f"{cells[names[0]]} [{cells[unit]}]" if unit is not None and cells[unit] else str(cells[names[0]])
+        rows.append((line.number, [cells[n] for n in keys], name, cells[values]))
+    several = len({name for _, _, name, _ in rows}) > 1
+    return _spread(source, layout, [layout.headers[n] for n in keys], rows) if several else None
+
+
+def _join_blocks(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> Sheet | None:
+    """Join blocks one below the other that have a first column, such as the time, in common."""
+    if len(layout.headers) != 2 or len(vocabulary.roles(layout.headers)) < 2:
+        return None
+    headers = list[Sequence[str]]([layout.headers])
+    rows = list[tuple[int, list[str | float], str, str | float]]()
+    for line in source.lines(layout.lines_before_data):
+        cells = cells_of(line, layout.delimiter)
+        texts = list(map(str, cells))
+        if len(texts) == 2 and is_row(texts):
+            rows.append((line.number, [cells[0]], headers[-1][1], cells[1]))
+        elif len(texts) == 2 and texts[0] == layout.headers[0] and texts not in headers:
+            headers.append(texts)
+    return _spread(source, layout, [layout.headers[0]], rows) if len(headers) > 1 else None
+
+
+def _spread(
+    source: RowSource,
+    layout: Layout,
+    keys: Sequence[str],
+    rows: Sequence[tuple[int, Sequence[str | float], str, str | float]],
+) -> Sheet:
+    """Make one row of the rows with equal keys, with a column for each quantity that they name.
+
+    Args:
+        source: lines or rows of the file.
+        layout: layout of the file.
+        keys: headers of the columns with the keys, such as the frequency.
+        rows: line number, keys, name of the quantity, and value of each row.
+
+    Returns:
+        Sheet with the lines above the table, a header, and the rows in the order of their first values; a quantity that
+        occurs again with equal keys begins a further row.
+    """
+    names = list(dict.fromkeys(name for _, _, name, _ in rows))
+    spread = dict[tuple[tuple[str | float, ...], int], list[str | float]]()
+    counts = dict[tuple[tuple[str | float, ...], str], int]()
+    for _, key, name, value in rows:
+        repeat = counts[tuple(key), name] = counts.get((tuple(key), name), 0) + 1
+        row = spread.setdefault((tuple(key), repeat), [*key, *[""] * len(names)])
+        row[len(key) + names.index(name)] = value
+    above = [line.content for line in source.head() if line.number < layout.header_line]
+    above = [[content] if isinstance(content, str) else content for content in above]
+    return Sheet(source.sheet or "", [*above, [*keys, *names], *spread.values()])
+
+
+def _exchange_rows(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> Sheet | None:
+    """Exchange rows and columns of tables with a row for each quantity, such as "f [Hz]; 1; 2; 5" or "f; Hz; 1; 2; 5".
+
+    Args:
+        source: lines or rows of the file.
+        layout: layout of the file if it is read as a table with a column for each quantity.
+        vocabulary: known column names.
+
+    Returns:
+        Sheet with the exchanged tables, below the lines above each; None if there is no such table.
+    """
+    lines = [Line(line.number, list(map(str, cells_of(line, layout.delimiter)))) for line in source.head()]
+    names = [next(filter(None, map(str, line.content)), "") for line in lines]
+    if len(vocabulary.roles([_LEVEL.sub("", name) for name in names if not is_like_number(name)])) < 2:
+        return None
+
+    def count_texts(line: Line) -> int | None:
+        """Number of texts in front of the numbers of a row that has both, and nothing behind; None for other lines."""
+        first = next((index for index, cell in enumerate(line.content) if is_like_number(str(cell))), 0)
+        numbers = [str(cell) for cell in line.content[first:] if cell != ""]
+        is_named = any(line.content[:first]) and len(line.content) - first > 2 and all(map(is_like_number, numbers))
+        return first if is_named else None
+
+    content, is_exchanged = list[Sequence[str | float]](), False
+    for above, rows in find_segments(lines, count_texts):
+        table, group = list[list[str]](), ""
+        for line in rows:
+            texts, numbers = list(map(str, line.content)), list(map(str, line.content[count_texts(line) :]))
+            texts = texts[: len(texts) - len(numbers)]
+            group = texts[0] or group
+            words = sorted(filter(None, (group, *texts[1:])), key=lambda text: bool(_LEVEL.fullmatch(text)))
+            table.append([" ".join(f"[{word}]" if units.is_unit(word) else word for word in words), *numbers])
+        plain_names = [_LEVEL.sub("", cells[0]) for cells in table]
+        roles = vocabulary.roles(plain_names)
+        is_record = is_test(roles) and len(table[0]) > FEWEST_LOOP_ROWS  # more than a summary of its channels
+        is_table = is_record or ("frequency" in roles and len(roles) > 2)
+        is_exchanged |= is_table
+        content += [line.content for line in above]
+        content += zip_longest(*table, fillvalue="") if is_table else [line.content for line in rows]
+    return Sheet(source.sheet or "", content) if is_exchanged else None
