@@ -16,7 +16,7 @@ from bushfit.caveat import Caveat
 from bushfit.reading.headers import COUNTED, SWEEP_COLUMNS, Vocabulary
 from bushfit.reading.lines import Line, is_summary_row
 from bushfit.reading.names import is_remark, labels_and_text_above, labels_in_names, named_direction, named_quantities
-from bushfit.reading.numerals import is_like_number
+from bushfit.reading.numerals import is_like_number, without_groups
 from bushfit.reading.roles import CONDITIONS
 from bushfit.reading.source import cells_of
 
@@ -48,6 +48,7 @@ def find_lines_above(table: Table) -> list[Line]:
     layout, last = table.layout, table.layout.lines_before_data
     not_above = (layout.header_line, layout.units_line)
     lines = [line for line in table.source.head() if line.number <= last and line.number not in not_above]
+    lines = [plain_numbers(line, table.first_decimal) for line in lines]
     marks = {mark: header for header in table.headers for mark in _FOOTNOTE_MARK.findall(header)}
     for line in table.source.tail():
         cells = list(map(str, cells_of(line, layout.delimiter)))
@@ -56,6 +57,14 @@ def find_lines_above(table: Table) -> list[Line]:
             mark = line.text[:1]
             lines.append(Line(line.number, f"{marks[mark]}: {line.text[1:]}") if mark in marks else line)
     return lines
+
+
+def plain_numbers(line: Line, decimal: str | None) -> Line:
+    """Return a line whose texts have numbers without thousands separators; see `without_groups`."""
+    if isinstance(line.content, str):
+        return line._replace(content=without_groups(line.content, decimal))
+    cells = [without_groups(cell, decimal) if isinstance(cell, str) else cell for cell in line.content]
+    return line._replace(content=cells)
 
 
 def find_remarks(table: Table) -> tuple[Caveat, ...]:

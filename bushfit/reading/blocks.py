@@ -9,12 +9,13 @@ from itertools import groupby, islice
 from typing import NamedTuple
 
 from bushfit import units
-from bushfit.reading.block_labels import is_of_block, label_columns
+from bushfit.caveat import Caveat
+from bushfit.reading.block_labels import is_of_block, label_columns, plain_numbers
 from bushfit.reading.headers import WORDS, Vocabulary, plain, split_unit, without_mean
 from bushfit.reading.layout import Layout
-from bushfit.reading.lines import WITH_UNIT, Line, is_comment, is_row, is_summary_row, is_units_row
+from bushfit.reading.lines import WITH_UNIT, Line, is_comment, is_row, is_summary_row, is_units_row, split
 from bushfit.reading.names import NO_LABELS, labels_above
-from bushfit.reading.numerals import is_like_number, plainest_value
+from bushfit.reading.numerals import common_decimal, is_like_number, plainest_value
 from bushfit.reading.roles import PAIRS
 from bushfit.reading.source import Channels, RowSource, Sheet, Text, cells_of
 
@@ -28,6 +29,8 @@ _NUMERIC = b"0123456789.,+-eEdD \t\r\n"
 _COMPLEX = re.compile(
     r"\(?\s*([+-]?[\d.,]+(?:[eEdD][+-]?\d+)?)\s*([+-]\s*[\d.,]+(?:[eEdD][+-]?\d+)?)\s*\*?\s*[ij]\s*\)?"
 )
+#: Number with its uncertainty: "600 ± 3", "600 +/- 3", "600 (±3)", "600(3)".
+_UNCERTAIN = re.compile(r"([+-]?\d[\d.,]*)\s*(?:\(?\s*(?:±|\+/?-)\s*\d[\d.,]*\s*%?\)?|\(\d+\))")
 #: Name of a block in a header, with the number behind it: "K axial [N/mm]", "K*_S1", "tan d Part 1", "K* #2", "K 2".
 _NAME_OF_SIDE = re.compile(r"(?<![^\s_])(?=((?:[^\W\d_][^\W_]*[\s_])?#?\d|[^\W\d_][^\W_]*)(?![^\s_]))")
 #: Words for a set point, a deviation or a corrected value, which name no block.
@@ -117,7 +120,10 @@ def combined(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> tuple
         return _with_plain_cells(source, layout)
     headings = (vocabulary.heading(*column) for column in zip(layout.headers, layout.units, strict=True))
     roles = {heading.role for heading in headings if heading}
-    added = label_columns([block.above for block in blocks], vocabulary, roles, are_sides=bool(sides))
+    cells_below = (((0, 0), cell) for row in blocks[0].rows for cell in split(row.content, layout.delimiter))
+    decimal = common_decimal(cells_below)
+    lines_above = [[plain_numbers(line, decimal) for line in block.above] for block in blocks]
+    added = label_columns(lines_above, vocabulary, roles, are_sides=bool(sides))
     numbers, content, width = list[int](), list[Sequence[str | float]](), len(layout.headers)
     for index, row in ((index, row) for index, block in enumerate(blocks) for row in block.rows):
         cells, texts = cells_of(row, layout.delimiter), [column[index] for column in added.values()]
@@ -261,6 +267,8 @@ def _stacked_blocks(source: RowSource, layout: Layout, vocabulary: Vocabulary) -
 def _with_plain_cells(source: RowSource, layout: Layout) -> tuple[RowSource, Layout]:
     """Split cells with more than a number: a complex number into two columns, a unit off into the row of units.
 
+    An uncertainty behind a number is left out, and so is a plus-minus sign before it.
+
     A unit is split off if the first cells of a column have compatible units; the first is that of the column.
     """
     first = [cells_of(line, layout.delimiter) for line in islice(source.lines(layout.lines_before_data), _FIRST)]
@@ -269,7 +277,10 @@ def _with_plain_cells(source: RowSource, layout: Layout) -> tuple[RowSource, Lay
     is_complex = [any(map(_COMPLEX.fullmatch, texts)) for texts in by_column]
     stated = [in_row or split_unit(header)[1] or "" for header, in_row in zip(headers, row_of_units, strict=True)]
     unit_of = [_common_unit(texts, unit) for texts, unit in zip(by_column, stated, strict=True)]
-    if not any(is_complex) and not any(unit_of):
+    is_uncertain = [
+        len(texts) > 0 and all(_UNCERTAIN.fullmatch(text) or text[0] == "±" for text in texts) for texts in by_column
+    ]
+    if not (any(is_complex) or any(unit_of) or any(is_uncertain)):
         return source, layout
     lines = [(line.number, list(cells_of(line, layout.delimiter))) for line in source.lines(layout.lines_before_data)]
     for index in reversed(range(len(headers))):
@@ -280,12 +291,20 @@ def _with_plain_cells(source: RowSource, layout: Layout) -> tuple[RowSource, Lay
             suffix = f" [{unit_text}]" if unit_text else ""
             headers[index : index + 1] = [f"{name} real{suffix}", f"{name} imaginary{suffix}"]
             row_of_units[index : index + 1] = [row_of_units[index]] * 2
-        else:
+        elif not is_uncertain[index]:
             continue
         for _, cells in lines:
             text = str(cells[index]) if index < len(cells) else ""
-            cells[index : index + 1] = [_in_unit(text, unit)] if unit else _complex_parts(text)
+            if is_uncertain[index]:
+                cells[index : index + 1] = [_UNCERTAIN.sub(r"\1", text).lstrip("± ")]
+            else:
+                cells[index : index + 1] = [_in_unit(text, unit)] if unit else _complex_parts(text)
     layout = replace(layout, headers=tuple(headers), units=tuple(row_of_units))
+    if uncertain := [f'"{header}"' for header, is_one in zip(layout.headers, is_uncertain, strict=False) if is_one]:
+        note = Caveat(
+            "uncertainty_left_out", f"{', '.join(uncertain)}: plus-minus signs and uncertainties are left out"
+        )
+        layout = replace(layout, notes=(*layout.notes, note))
     numbers, content = zip(*lines, strict=True)
     return Sheet(source.sheet or "", content, numbers=numbers, above=source.head()), layout
 

@@ -30,7 +30,7 @@ from bushfit.reading.inference import (
     moves_along,
     name_parallel_spring,
 )
-from bushfit.reading.si_columns import column_of, first_numbers, is_angular
+from bushfit.reading.si_columns import column_of, first_numbers, is_angular, refuse_second_unit
 from bushfit.reading.table import Table
 from bushfit.reading.times import clock
 
@@ -103,6 +103,8 @@ def classify(
     if {"displacement", "force"} <= {*roles} and "displacement" not in columns:
         for column in (one for one in unused if moves_along(table, roles["displacement"], one)):
             _preferred_column(table, roles["displacement"], replace(column, role="displacement"))
+    for column in (column for role, column in roles.items() if role not in stated_units):
+        refuse_second_unit(table, column)
     for column in (roles[role] for role in stated_units if role in roles):
         written = parse_unit(split_unit(column.header)[1] or table.layout.units[column.index])[0]
         if written != column.unit and units.is_compatible(written, column.unit or ""):

@@ -89,8 +89,8 @@ _NAMED_QUANTITY = re.compile(
 )
 #: Separator of several statements in a line: "Temp: 23 C, Preload: 500 N".
 _PARTS_OF_LINE = re.compile(r"[,;|]\s+|\s/\s|\t")
-#: Decimal comma of a number at the start of a value.
-_COMMA = re.compile(r"^([+-]?\d+),(?=\d+(?!\d|[.,]\d))")
+#: Decimal comma of a number at the start of a value; the comma of 1,500 may separate thousands.
+_COMMA = re.compile(r"^([+-]?0|[+-]?\d+(?=,(?!\d{3}(?!\d)))),(?=\d+(?!\d|[.,]\d))")
 #: Unit of a sampling rate in samples: "kS/s", "samples/s", "SPS".
 _SAMPLES = re.compile(r"^(k|M)?(?:sps|(?:s|sa|samples?|pts|points|scans?)\s?/\s?s(?:ec)?)$", re.IGNORECASE)
 #: Number with a decimal mark or exponent, and its unit, if any.
@@ -190,6 +190,8 @@ def _labels_in_name(name: str) -> Labels:
     for match in _QUANTITY.finditer(rest):
         if match["number"].isdecimal() and _PERHAPS_DECIMAL.search(rest[: match.start("number")]):
             continue
+        if re.fullmatch(r"[1-9]\d{0,2},\d{3}", match["number"]):
+            continue  # "1,500N" may be 1500 N or 1.5 N
         word, sign = plain(match["word"] or ""), match["sign"]
         is_joined = bool(match["word"]) and not match["gap"] and not sign
         unit, digits = _UNITS[match["unit"].lower()], re.sub("[,p]", ".", match["number"].lower())

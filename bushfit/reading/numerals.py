@@ -37,6 +37,13 @@ _RAISED = f"[{''.join(map(chr, SUPERSCRIPTS))}]"
 _TIMES_TEN = rf"[{BLANKS}]?[x×*·⋅][{BLANKS}]?10(?:\^|\*\*|(?={_RAISED}))"
 #: Exponent behind a number; Fortran writes 1.0D-03.
 EXPONENT = rf"(?:(?:[eEdD]|{_TIMES_TEN})(?:{_SIGN}?\d+|{_RAISED}+))"
+#: Number in running text that may have thousands separators: "1,500", "12 500.0"; the separator is not mixed.
+_GROUPED = re.compile(
+    rf"(?<![\w.,'])[1-9]\d{{0,2}}(?P<mark>[.,{BLANKS}{APOSTROPHES}])\d{{3}}(?:(?P=mark)\d{{3}})*"
+    r"(?:(?!(?P=mark))[.,]\d+)?(?![.,']?\d)"
+)
+#: Text in front of a number whose thousands are separated by blanks; "Run 1 500 N" has two numbers.
+_BEFORE_BLANKS = re.compile(r"(?:^|[:=;,(\t])[\s+-]*$")
 #: Text with the characters of a number, in an order that numbers may have.
 _LIKE_NUMBER = re.compile(rf"{_SIGN}?[.,]?\d[\d.,{BLANKS}{APOSTROPHES}]*{EXPONENT}?", re.ASCII)
 #: Number whose point or comma may be the thousands separator or the decimal mark: 1.234.
@@ -113,6 +120,28 @@ def plainest_value(text: str) -> float:
     return next((value for way in ALL_NUMERALS if (value := way.value(text)) is not None), math.nan)
 
 
+def without_groups(text: str, decimal: str | None) -> str:
+    """Write the numbers of a running text without thousands separators and, if these are clear, with a decimal point.
+
+    Args:
+        text: text that may contain numbers such as "1,500" or "1.500,0".
+        decimal: decimal mark of the numbers in the same file; None if it is not known.
+
+    Returns:
+        Text in which numbers that have one value only are plain; the others are unchanged.
+    """
+
+    def plain(match: re.Match[str]) -> str:
+        """One number without separators."""
+        if match["mark"] in BLANKS and not _BEFORE_BLANKS.search(text[: match.start()]):
+            return match[0]
+        values = {way.decimal: value for way in ALL_NUMERALS if (value := way.value(match[0])) is not None}
+        distinct = {values[decimal]} if decimal in values else {*values.values()}
+        return f"{distinct.pop():.12g}" if len(distinct) == 1 else match[0]
+
+    return _GROUPED.sub(plain, text)
+
+
 def consistent_notations(
     cells: Iterable[tuple[Place, str]], ways: tuple[Numerals, ...] = ALL_NUMERALS, *, all_cells: bool = False
 ) -> NumeralEvidence:
@@ -163,8 +192,13 @@ def consistent_notations(
 
 def find_first_decimal(table: Table) -> str | None:
     """Decimal mark of the first thousand numbers; None if they leave it open."""
-    ways = consistent_notations(islice(_number_texts(table), _FIRST), _possible_numerals(table)).ways
-    return ways[0].decimal if len({way.decimal for way in ways}) == 1 else None
+    return common_decimal(islice(_number_texts(table), _FIRST), _possible_numerals(table))
+
+
+def common_decimal(cells: Iterable[tuple[Place, str]], ways: tuple[Numerals, ...] = ALL_NUMERALS) -> str | None:
+    """Decimal mark of some cells, given by location and text; None if they leave it open."""
+    remaining = consistent_notations(cells, ways).ways
+    return remaining[0].decimal if len({way.decimal for way in remaining}) == 1 else None
 
 
 def find_numerals(table: Table) -> Numerals:

@@ -64,14 +64,15 @@ def _spread_names(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> 
     names = [
         n for n, texts in enumerate(columns) if n not in (values, unit) and all(map(vocabulary.heading, texts or [""]))
     ]
-    if len(names) != 1:
+    if not names:
         return None
-    width = len(layout.headers)
-    keys = [n for n in range(width) if n not in (names[0], values, unit)]
+    name_column, width = max(names, key=lambda n: len(columns[n])), len(layout.headers)
+    keys = [n for n in range(width) if n not in (name_column, values, unit)]
     rows = list[tuple[int, list[str | float], str, str | float]]()
     for line in source.lines(layout.lines_before_data):
         cells = [*cells_of(line, layout.delimiter), *[""] * width]
-        name = f"{cells[names[0]]} [{cells[unit]}]" if unit is not None and cells[unit] else str(cells[names[0]])
+        name = str(cells[name_column])
+        name += f" [{cells[unit]}]" if unit is not None and cells[unit] else ""
         rows.append((line.number, [cells[n] for n in keys], name, cells[values]))
     several = len({name for _, _, name, _ in rows}) > 1
     return _spread(source, layout, [layout.headers[n] for n in keys], rows) if several else None

@@ -214,15 +214,29 @@ def column_of(table: Table, heading: Heading, index: int, stated_unit: str | Non
     unit, convention = next(iter(texts), None), next(iter(conventions), None)
     column = Column(heading.role, unit, convention, logarithm, header=table.headers[index], index=index)
     if len(texts) > 1 or len(conventions) > 1:
-        raise UnitError(
-            f"two units for the {heading.role.replace('_', ' ')}",
-            file=table.file,
-            place=table.place(table.layout.header_line, column),
-            found=" and ".join(texts if len(texts) > 1 else sorted(conventions)),
-            expected="one unit, from the header or the units row",
-            hint=f'state the right one in the campaign: units = {{ {heading.role} = "{texts[0]}" }}',
-        )
+        raise _two_units(table, column, texts if len(texts) > 1 else sorted(conventions))
     return column
+
+
+def refuse_second_unit(table: Table, column: Column) -> None:
+    """Refuse a header that contains two units of different size, such as "Force (kN) [N]"."""
+    name, unit, _ = split_unit(column.header)
+    inner_name, first, _ = split_unit(name.replace("_N_", "_N/"))  # names of programs have no slash: Kdyn_N_mm
+    is_pair = bool(unit and first) and inner_name != first and units.is_compatible(first or "", unit or "")
+    if unit and first and is_pair and units.si_factor(first, unit) != units.si_factor(unit, unit):
+        raise _two_units(table, column, [unit, first])
+
+
+def _two_units(table: Table, column: Column, texts: Sequence[str]) -> UnitError:
+    """Error for a column with two different units or conventions."""
+    return UnitError(
+        f"two units for the {column.role.replace('_', ' ')}",
+        file=table.file,
+        place=table.place(table.layout.header_line, column),
+        found=" and ".join(texts),
+        expected="one unit, from the header or the units row",
+        hint=f'state the right one in the campaign: units = {{ {column.role} = "{texts[0]}" }}',
+    )
 
 
 def first_numbers(table: Table, columns: Sequence[Column]) -> NDArray[np.float64]:
