@@ -336,7 +336,7 @@ def _layout(
     directly_above = split(lines[index - 1].content, delimiter) if index else []
     if of_units:
         units_line, row = of_units[0][0], ["", *of_units[0][1][1:], *row][: len(headers)]
-    elif len(directly_above) == len(headers) and all(directly_above) and is_units_row(directly_above):
+    elif len(directly_above) == len(headers) and all(is_units_row([cell]) for cell in directly_above):
         row = [cell.strip("[]() ") for cell in directly_above]
     elif below:
         cells = [cell.strip("[]() ") for cell in below[0][1]]

@@ -34,6 +34,8 @@ if TYPE_CHECKING:
 
 #: Number above zero of a stated multiple of a unit, such as 200 N for the force of 1 V.
 _MULTIPLE = re.compile(r"^(?=[\d.]*[1-9])\d+\.?\d*(?=\s+[^\W\d_])")
+#: Two units at the end of a header: "Force (kN) [N]", "Amplitude_mm [µm]".
+_TWO_UNITS = re.compile(r"[\[(_]([^\[\]()_]+)[\])]?\s*[\[(]([^\[\]()]+)[\])]$")
 #: Starts of the names of an angular frequency.
 _ANGULAR = ("angular", "angfreq", "omega", "ω", "kreisfrequenz", "pulsa", "角频率")
 #: Start of the name of a logarithm, in the spelling that `plain` returns.
@@ -219,12 +221,11 @@ def column_of(table: Table, heading: Heading, index: int, stated_unit: str | Non
 
 
 def refuse_second_unit(table: Table, column: Column) -> None:
-    """Refuse a header that contains two units of different size, such as "Force (kN) [N]"."""
-    name, unit, _ = split_unit(column.header)
-    inner_name, first, _ = split_unit(name.replace("_N_", "_N/"))  # names of programs have no slash: Kdyn_N_mm
-    is_pair = bool(unit and first) and inner_name != first and units.is_compatible(first or "", unit or "")
-    if unit and first and is_pair and units.si_factor(first, unit) != units.si_factor(unit, unit):
-        raise _two_units(table, column, [unit, first])
+    """Refuse a header that ends in two units of different size, such as "Force (kN) [N]"."""
+    match = _TWO_UNITS.search(column.header)
+    first, second = match.groups() if match else ("", "")
+    if units.is_compatible(first, second) and units.si_factor(first, second) != units.si_factor(second, second):
+        raise _two_units(table, column, [second, first])
 
 
 def _two_units(table: Table, column: Column, texts: Sequence[str]) -> UnitError:
