@@ -33,7 +33,7 @@ def probability_text(composition: Composition, finding: Finding) -> str:
 
 def undecided_text(reported: Sequence[Composition]) -> str:
     """Return a sentence on the explanations that the tests cannot distinguish, and on the parts they share."""
-    parts = [composition.label.replace("fault: ", "a fault of ").split(" + ") for composition in reported]
+    parts = [[label.replace("fault: ", "a fault of ") for label in composition.labels] for composition in reported]
     shared = [name for name in parts[0] if all(name in names for names in parts)]
     common = f"all probable explanations contain {' and '.join(shared)}"
     rests = [" + ".join(name for name in names if name not in shared) for names in parts]
@@ -88,7 +88,7 @@ def explanation_odds(finding: Finding) -> Odds:
         fit = composition.best.state.plain if is_rival and composition.best.refitted else None
         fits.append((fit.model, misfit_covariance(fit)) if fit else None)
     pairs = tuple(zip(sentences, (composition.probability for composition in compositions), strict=True))
-    labels = tuple(composition.label for composition in compositions)
+    labels = tuple(composition.labels for composition in compositions)
     return Odds(finding.nothing, pairs, tuple(fits), labels)
 
 

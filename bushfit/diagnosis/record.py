@@ -117,13 +117,13 @@ class Odds:
         explanations: text and probability (if anything is missing) of each explanation, the most probable first.
         fits: fitted model of each explanation, with its covariance; None for the reported explanation, and for an
             explanation that was not fitted.
-        labels: names of the effects, mistakes and faults of each explanation, joined by " + ".
+        labels: names of the effects, mistakes and faults of each explanation.
     """
 
     nothing: float
     explanations: tuple[tuple[str, float], ...] = ()
     fits: tuple[tuple[Model, Covariance] | None, ...] = ()
-    labels: tuple[str, ...] = ()
+    labels: tuple[tuple[str, ...], ...] = ()
 
     def averaged(self, result: Result) -> Result:
         """Widen the uncertainty of a result by the probability of other explanations.

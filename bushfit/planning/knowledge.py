@@ -103,8 +103,8 @@ def from_campaign(data: PreparedCampaign, rivals: Sequence[str] | None = None) -
     fits = _add_effects(plain, names, fixed, data.bounds)
     _check_rivals(names, fits)
     probabilities = defaultdict[str, float](float)
-    for label, (_, share) in zip(diagnosis.odds.labels, diagnosis.odds.explanations, strict=True):
-        for name in label.split(" + "):
+    for labels, (_, share) in zip(diagnosis.odds.labels, diagnosis.odds.explanations, strict=True):
+        for name in labels:
             probabilities[name] += share
     smallest = min(probabilities.values(), default=1.0)
     models = [replace(knowledge(fits[name]), probability=probabilities[name] or smallest) for name in names]
