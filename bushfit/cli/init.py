@@ -73,9 +73,8 @@ def command(files: tuple[Path, ...], name: str | None, no_input: bool, output: O
     if name is None and questions.enabled and not any(sizes.values()):
         name = click.prompt("name of the bushing", default=usual, err=True)
     name = name or usual
-    folder, target = output.folder(name), "campaign.toml"
-    if output.output and output.output.suffix == ".toml":
-        folder, target = output.output.parent, output.output.name
+    file = output.output if output.output and output.output.suffix == ".toml" else None
+    folder, target = (file.parent, file.name) if file else (output.folder(name), "campaign.toml")
     size = partial(make_bushing, name)
     bushing = questions.complete(sizes, size) if any(sizes.values()) else None
     sources, left_out = gather(files, test_options)
@@ -86,7 +85,7 @@ def command(files: tuple[Path, ...], name: str | None, no_input: bool, output: O
         bushing = questions.complete(sizes, size)
     table = bushing and bushing[1]
     if len({inspection.part for inspection in inspections if inspection.part}) > 1:
-        target = target if output.output and output.output.suffix == ".toml" else "batch.toml"
+        target = target if file else "batch.toml"
         written = campaigns_of_parts(name, table, inspections, folder, target)
     else:
         written = {target: campaign_text(name, table, inspections, folder)}

@@ -121,7 +121,7 @@ class Output:
         return _Console(stderr=True, quiet=self.quiet)
 
     def folder(self, name: str, *files: str) -> Path:
-        """Folder for results: --output, or the default; checked for conflicts if names of files are given.
+        """Folder for results: --output, or the default; checked for conflicts before anything is printed.
 
         Args:
             name: name of the result, which replaces the placeholder in the default folder.
@@ -131,8 +131,7 @@ class Output:
             OutputError: the folder cannot be written, or contains one of the files.
         """
         folder = self.output or Path(re.sub("<.*>", lambda _: folder_name(name), self.default))
-        if files:
-            check_free(folder, files, overwrite=self.force)
+        check_free(folder, files, overwrite=self.force)
         return folder
 
     def print(self, text: str) -> None:

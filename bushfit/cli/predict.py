@@ -95,6 +95,8 @@ def command(model: Path, campaign: Path | None, bushing: str | None, output: Out
         settings |= {"frequencies": None, "static": True}
     target = None if bushing is None else _bushing_of(result, bushing)
     predicted = predict(result, loaded, bushing=target, **settings)
+    tables = (output.formats.table(file.name) for file in predicted.files if file.kind == "table")
+    folder = output.folder((loaded or predicted.result).name, *tables)
     _print_summary(output, predicted)
     print_predictions(output, predicted)
     for resonance in predicted.resonances:
@@ -109,7 +111,6 @@ def command(model: Path, campaign: Path | None, bushing: str | None, output: Out
         output.print(part.sentence)
     print_tests(output, predicted.tests, predicted.usable)
     inputs = input_files(loaded, model_file(model), Path(bushing) if bushing and target != bushing else None)
-    folder = output.folder((loaded or predicted.result).name)
     output.write(folder, predicted.files, predicted.document, inputs)
 
 

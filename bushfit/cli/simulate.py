@@ -66,8 +66,9 @@ def command(source: Path, effects: tuple[str, ...], output: Output, **settings: 
     if truth.unnamed:
         sentence = "the unnamed correction is left out, because it applies only to steady states, not in time"
         output.warn([Caveat("correction_not_simulated", sentence)])
+    folder = output.folder(result.name, *(file.name for file in files))
     output.print(result.model.equation())
-    output.write(output.folder(result.name), files, document, [source])
+    output.write(folder, files, document, [source])
 
 
 def _with_effect(model: Model, text: str) -> Model:
