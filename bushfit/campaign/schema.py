@@ -88,6 +88,7 @@ class RigSettings:
         gain_error, displacement_error: relative standard deviation of the calibration of force and of displacement,
             which all repeats of a test may share.
         phase_error: standard deviation of the phase [rad], which all repeats of a test may share.
+        compliance_error: standard deviation of a compliance [m/N] in series with the bushing, which all tests share.
         max_force, max_moment: largest zero-to-peak force or moment [N, N m].
         max_displacement, max_rotation: largest zero-to-peak displacement or rotation [m, rad].
         max_frequency: largest frequency [Hz].
@@ -99,6 +100,7 @@ class RigSettings:
     gain_error: Share | None = None
     phase_error: Annotated[float, si("rad"), Field(ge=0)] | None = None
     displacement_error: Share | None = None
+    compliance_error: Annotated[float, si("m/N"), Field(ge=0)] | None = None
     max_force: Annotated[float, si("N"), Field(gt=0)] | None = None
     max_moment: Annotated[float, si("N*m"), Field(gt=0)] | None = None
     max_displacement: Length | None = None

@@ -45,7 +45,8 @@ _NOTHING = "the tests show no missing effect beyond noise and tolerance"
 _ONE_DIRECTION = Caveat(
     "one_direction",
     "only one direction was tested: a smooth fault of the rig, such as a compliant fixture, would be taken for a "
-    "property of the rubber. Test another direction or specimen, or a spring of known stiffness",
+    "property of the rubber. Test another direction or specimen, or a spring of known stiffness, or state the size of "
+    "the compliance (compliance_error under [rig])",
 )
 #: Advice if levels disagree by more than the class of the rig.
 _LEVELS_ADVICE = "measure the levels again in another session, or state the class of the rig (gain_error under [rig])"

@@ -22,7 +22,7 @@ from bushfit.fitting.preparation import (
     split_by_kind,
 )
 from bushfit.fitting.problem import FitProblem, SmoothError
-from bushfit.geometry import Bushing, Direction, stiffness_per_modulus, unit_strain
+from bushfit.geometry import TRANSLATION, Bushing, Direction, stiffness_per_modulus, unit_strain
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
 from bushfit.model.result import PreloadRange, Quality, Range
@@ -62,7 +62,8 @@ def covariance(
         Covariance of the parameter values in SI units. If the residuals of a stage, or of one of its tests, exceed the
         noise, the variance that a test contributes is multiplied by the larger of the two reduced chi-squares. The
         uncertainty of an estimated noise is added after Kenward and Roger (1997); `spread` is its effect on the
-        covariance itself.
+        covariance itself. The error of a compliance of the rig, which all tests share, is added as the shift that it
+        causes in the parameters.
 
     Notes:
         Let d be the errors of all parameters. Each stage solves J_s (J_s^T d_s + J_r^T d_r + noise) = 0 for its
@@ -97,9 +98,14 @@ def covariance(
     by_value, reaction = (reaction @ root) * slopes[:, None], reaction * slopes[:, None]
     carried = reaction[:, : len(fixed.names)] / slopes[: len(fixed.names)]
     matrix, spread = by_value @ by_value.T, [carried @ part @ carried.T for part in fixed.spread]
-    by_noise = dict[Hashable, tuple[Array, Array]]()
+    by_noise, by_compliance = dict[Hashable, tuple[Array, Array]](), np.zeros(len(names))
     for equations, basis, blocks in bases:
         influence = reaction[:, equations] @ basis
+        for test, rows in blocks:
+            if test.compliance_error and test.direction.motion is TRANSLATION:
+                stiffness = model.stiffness(test.direction, test.frequency, test.amplitude, kind=test.kind)
+                change = test.residual_change(test.compliance_error * stiffness**2, model)
+                by_compliance += influence[:, rows] @ change
         if smooth_error:  # beside it the error of the noise is the least part
             changes = influence[:, : smooth_error.columns.shape[1]] @ smooth_error.columns.T
             added = changes @ changes.T
@@ -113,6 +119,7 @@ def covariance(
         for variance, (change, lost) in _changes_by_noise(blocks, influence, basis).items():
             changes, losses = by_noise.get(variance, (0.0, 0.0))
             by_noise[variance] = changes + change, losses + lost
+    matrix = matrix + np.outer(by_compliance, by_compliance)
     for change, lost in by_noise.values():
         size = np.sqrt(np.diag(matrix))
         scale = np.outer(size, size) + np.finfo(float).tiny

@@ -34,6 +34,7 @@ class MeasuredBase(ABC):
             a sweep's file.
         model_error: standard deviation of the model's error, added to the noise, relative to |K| in phase and in
             quadrature, or relative to half the force range of a loop. 0: noise alone.
+        compliance_error: standard deviation of a compliance of the rig that all tests share [m/N].
         contradiction: warning on a disagreement with an earlier test of the same points; None without one.
     """
 
@@ -43,6 +44,7 @@ class MeasuredBase(ABC):
     weights: Array
     test_conditions: RubberConditions = UNKNOWN
     model_error: float = 0.0
+    compliance_error: float = 0.0
     contradiction: Caveat | None = None
 
     @abstractmethod

@@ -78,6 +78,9 @@ class PreparedCampaign:
             Model.with_defaults(None, with_base(fit.effects), {})
         loops = prepare_loops(campaign.loops, rig, without_outliers=fit.loss != "linear")
         sweeps = prepare_sweeps(campaign.sweeps, fit.residuals, rig)
+        compliance = rig.compliance_error or 0.0
+        loops = [replace(loop, compliance_error=compliance) for loop in loops]
+        sweeps = [replace(sweep, compliance_error=compliance) for sweep in sweeps]
         bounds = {name: (setting.min, setting.max) for name, setting in fit.parameters.items()}
         data = cls(campaign, tuple(loops), tuple(sweeps), bounds, constraints=constraints_of(campaign))
         return with_preload(data.with_rubber_conditions())

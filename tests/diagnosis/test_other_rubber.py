@@ -12,7 +12,10 @@ from rigged import BOTH, asked
 from scipy.special import ndtri
 
 from bushfit.campaign.campaign import Campaign
+from bushfit.campaign.schema import RigSettings
 from bushfit.campaign.simulated import SimulatedLoop, SimulatedSweep, SimulateSettings
+from bushfit.fitting.prepared_campaign import PreparedCampaign
+from bushfit.fitting.procedures import fit_joint
 from bushfit.geometry import Direction
 from bushfit.model.file import from_document, to_document
 from bushfit.prediction.stiffness import predict
@@ -129,3 +132,16 @@ def test_bands_include_that_a_part_of_the_correction_belongs_to_the_rig(rubber, 
     assert band.high[0] - band.low[0] < 0.15 * band.value[0]
     again = from_document(json.loads(json.dumps(to_document(result))))
     np.testing.assert_array_equal(predict(again, Direction.RADIAL, [45.0], [2e-4]).stiffness.high, band.high)
+
+
+def test_a_stated_compliance_of_the_rig_is_in_the_bands_of_one_direction(measured, paper_model):
+    """One direction cannot show a compliance, so the bands contain it only if its size is stated."""
+    radial = replace(measured({"rig_compliance": {"compliance": 2e-8}}), loops=())
+    radial = replace(radial, sweeps=radial.sweeps[1:])
+    frequency, inside = [6.0, 45.0, 150.0], []
+    true = np.abs(paper_model.stiffness(Direction.RADIAL, np.array(frequency), 2e-4))
+    for error in (None, 2e-8):
+        data = PreparedCampaign.from_campaign(replace(radial, rig=RigSettings(compliance_error=error)))
+        band = predict(fit_joint(data), Direction.RADIAL, frequency, [2e-4]).stiffness
+        inside.append(float(np.mean((band.low <= true) & (true <= band.high))))
+    assert inside == [0.0, 1.0]
