@@ -10,6 +10,7 @@ from operator import attrgetter
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import pandas as pd
+from typing_extensions import TypedDict
 
 from bushfit.caveat import Caveat, to_entries
 from bushfit.fitting.agreement import expected_errors, misfits
@@ -28,8 +29,28 @@ from bushfit.report.tables import prediction_table
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-#: Content of `predict --json`: columns of each table by header, null in an empty cell; warnings and their kinds.
-PredictionDocument = dict[str, dict[str, list[float | None]] | list[str]]
+
+class ArmsEntry(TypedDict):
+    """Maxwell arms in `predict --json`.
+
+    Args:
+        in_place_of: names of the effects that the arms replace.
+        shear_modulus_Pa: shear modulus of each arm, shortest relaxation time first.
+        relaxation_time_s: relaxation time of each arm.
+        band_Hz: lowest and highest frequency of the replacement.
+        largest_relative_error: largest relative error of the modulus in this band.
+    """
+
+    in_place_of: str
+    shear_modulus_Pa: list[float]
+    relaxation_time_s: list[float]
+    band_Hz: tuple[float, float]
+    largest_relative_error: float
+
+
+#: Content of `predict --json`: columns of each table by header, null in an empty cell; Maxwell arms under "arms";
+#: warnings and their kinds.
+PredictionDocument = dict[str, dict[str, list[float | None]] | list[ArmsEntry] | list[str]]
 #: A prediction or a static curve.
 Part = TypeVar("Part", Prediction, StaticCurve)
 
@@ -75,13 +96,13 @@ class PredictionOutput:
             document[f"{curves[0].direction}_static"] = table_columns(joined_table(tables.static_table, curves))
         if self.arms:
             document["arms"] = [
-                {
-                    "in_place_of": arms.replaced_effects,
-                    "shear_modulus_Pa": arms.modulus.tolist(),
-                    "relaxation_time_s": arms.time.tolist(),
-                    "band_Hz": arms.band,
-                    "largest_relative_error": arms.error,
-                }
+                ArmsEntry(
+                    in_place_of=arms.replaced_effects,
+                    shear_modulus_Pa=arms.modulus.tolist(),
+                    relaxation_time_s=arms.time.tolist(),
+                    band_Hz=arms.band,
+                    largest_relative_error=arms.error,
+                )
                 for arms in self.arms
             ]
         return {**document, **to_entries(self.warnings)}

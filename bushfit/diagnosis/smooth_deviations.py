@@ -19,7 +19,14 @@ from bushfit.diagnosis.explanations import Explanation, Group
 from bushfit.effects.contract import Array
 from bushfit.fitting.discrepancy import COMPOUND_LENGTHS
 from bushfit.fitting.loop_harmonics import SMOOTH_HARMONICS
-from bushfit.fitting.preparation import MeasuredLoop, MeasuredSweep, MeasuredTest, group_repeats, split_by_kind
+from bushfit.fitting.preparation import (
+    MeasuredLoop,
+    MeasuredSweep,
+    MeasuredTest,
+    group_repeats,
+    residual_slices,
+    split_by_kind,
+)
 from bushfit.fitting.problem import FitResult
 from bushfit.gaussian_process import coordinates, in_lengths, matern, patterns
 from bushfit.geometry import stiffness_per_modulus
@@ -111,17 +118,16 @@ def fast_relaxation(fit: FitResult) -> Array:
     their highest frequency.
 
     Returns:
-        Changes, (n,).
+        Changes, (n,); zero in the rows of priors, which follow those of the tests.
     """
     tests = fit.data_sets
     highest = max(float(test.frequency.max()) for test in tests)
     factors = [stiffness_per_modulus(fit.model.bushing, test.direction) for test in tests]
     modulus = np.median(np.concatenate([np.abs(test.measured) / k for test, k in zip(tests, factors, strict=True)]))
-    by_test = [
-        test.residual_change(1j * modulus * factor * test.frequency / highest, fit.model)
-        for test, factor in zip(tests, factors, strict=True)
-    ]
-    return np.concatenate(by_test)
+    changes = np.zeros(fit.residual.size)
+    for test, factor, rows in zip(tests, factors, residual_slices(tests), strict=True):
+        changes[rows] = test.residual_change(1j * modulus * factor * test.frequency / highest, fit.model)
+    return changes
 
 
 def _compound_correlation(points: Array, nodes: Array) -> Array:
