@@ -68,6 +68,8 @@ _SPELLINGS, _EXACT, _OF_ACCELERATION, _OF_LENGTH = (
 _EVERYDAY: dict[str, tuple[float, str]] = {
     unit: (scale, base) for base, scales in _WORDS["everyday"].items() for unit, scale in scales.items()
 }
+#: Definitions of the units that pint reads.
+_DEFINITIONS = Path(__file__).with_name("units.txt")
 #: The letters of one unit.
 _WORD = re.compile(r"[^\W\d_]+|[º˚]")
 #: Unit of mass that stands for the weight of this mass in a force or stiffness: kg, lbs.
@@ -129,6 +131,7 @@ def is_unit(text: str) -> bool:
     return is_compatible(text, text)
 
 
+@lru_cache(maxsize=4096)
 def is_compatible(text: str, expected: str) -> bool:
     """Return True if the text is a known unit of the same dimension as the expected SI unit."""
     try:
@@ -333,6 +336,8 @@ def _by_pint(text: str) -> tuple[float, str]:
     for word in _WORD.findall(text):
         if word in _WORDS["unclear"]:
             raise UnitError("a unit that can be read in two ways", found=f'"{text}"', expected=_WORDS["unclear"][word])
+    if not all({word.rstrip("¹²³"), word.rstrip("¹²³s")} & _defined_words() for word in _WORD.findall(text)):
+        raise unknown
     registry = _registry()
     try:
         unit = registry.parse_units(text.replace("⋅", "*"))
@@ -345,11 +350,20 @@ def _by_pint(text: str) -> tuple[float, str]:
 
 
 @lru_cache(maxsize=1)
+def _defined_words() -> set[str]:
+    """Names of the units in units.txt, with and without a prefix; other words are no units, and need no pint."""
+    lines = _DEFINITIONS.read_text(encoding="utf-8").splitlines()
+    names = {"per", "dimensionless", *(name.strip() for line in lines for name in line.split("="))}
+    prefixes = ["", *(name.removesuffix("-") for name in names if name.endswith("-"))]
+    return {prefix + name for prefix in prefixes for name in names}
+
+
+@lru_cache(maxsize=1)
 def _registry() -> pint.UnitRegistry[Any]:
     """Units of pint as units.txt defines them; imported at the first use, because pint is slow to import."""
     import pint
 
-    return pint.UnitRegistry(str(Path(__file__).with_name("units.txt")), cache_folder=None)
+    return pint.UnitRegistry(str(_DEFINITIONS), cache_folder=None)
 
 
 def kelvin_scale(unit: str) -> tuple[float, float] | None:

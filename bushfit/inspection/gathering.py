@@ -180,7 +180,7 @@ def split_sheets(file: TestSource, test_options: Mapping[str, Any]) -> tuple[lis
     if not tests and file.is_named:  # the error of the whole file says why
         return whole, []
     if without and len(parts) > 1:
-        of_book = labels_above(line for sheet in sheets if sheet.sheet in without for line in sheet.head())
+        of_book = labels_above(line for sheet in sheets if sheet.sheet in without for line in sheet.head)
         tests = [replace(test, of_book=of_book) for test in tests]
     return tests, left_out
 

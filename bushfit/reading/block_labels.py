@@ -47,7 +47,7 @@ def find_lines_above(table: Table) -> list[Line]:
     """
     layout, last = table.layout, table.layout.lines_before_data
     not_above = (layout.header_line, layout.units_line)
-    lines = [line for line in table.source.head() if line.number <= last and line.number not in not_above]
+    lines = [line for line in table.source.head if line.number <= last and line.number not in not_above]
     lines = [plain_numbers(line, table.first_decimal) for line in lines]
     marks = {mark: header for header in table.headers for mark in _FOOTNOTE_MARK.findall(header)}
     for line in table.source.tail():

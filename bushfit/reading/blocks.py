@@ -131,7 +131,7 @@ def combined(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> tuple
         content.append(cells if is_remark or len(cells) > width else [*cells, *[""] * (width - len(cells)), *texts])
         numbers.append(row.number)
     layout = replace(layout, headers=(*layout.headers, *added), units=(*layout.units, *[""] * len(added)))
-    head = [line for line in source.head() if line.number < layout.header_line]
+    head = [line for line in source.head if line.number < layout.header_line]
     of_titles = {line.number for block in blocks for line in block.above}
     above = [
         line for line in head if not (line.number in of_titles if sides else is_of_block(line, [*added], vocabulary))
@@ -189,7 +189,7 @@ def _side_by_side(source: RowSource, layout: Layout, sides: Sequence[Side]) -> l
 
     Blocks that share columns are separated only if their titles differ; otherwise the list is empty.
     """
-    head = [line for line in source.head() if line.number < layout.header_line]
+    head = [line for line in source.head if line.number < layout.header_line]
     rows = [line for line in source.lines(layout.lines_before_data) if not is_comment(line.content, layout.delimiter)]
     width = len(layout.headers)
     titles: list[list[Line]] = [[Line(layout.header_line, side.title)] * bool(side.title) for side in sides]
@@ -247,7 +247,7 @@ def _stacked_blocks(source: RowSource, layout: Layout, vocabulary: Vocabulary) -
         is_same = has_meaning and [vocabulary.heading(cell) or cell for cell in cells] == meanings
         return is_same or layout.is_repeated(cells)
 
-    blocks = [Segment([line for line in source.head() if line.number < layout.header_line], [])]
+    blocks = [Segment([line for line in source.head if line.number < layout.header_line], [])]
     for above, rows in find_segments(source.lines(layout.lines_before_data), is_data):
         between = [line for line in above if not is_header(line)]
         labels = between
@@ -306,7 +306,7 @@ def _with_plain_cells(source: RowSource, layout: Layout) -> tuple[RowSource, Lay
         )
         layout = replace(layout, notes=(*layout.notes, note))
     numbers, content = zip(*lines, strict=True)
-    return Sheet(source.sheet or "", content, numbers=numbers, above=source.head()), layout
+    return Sheet(source.sheet or "", content, numbers=numbers, above=source.head), layout
 
 
 def _complex_parts(text: str) -> list[str | float]:

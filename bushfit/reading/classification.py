@@ -76,7 +76,8 @@ def classify(
             continue
         if heading is None or (plain_name(header) == "k" and heading.role in roles):
             continue
-        if heading.role == "time" and all(row[index] == "" for row in table.first_rows) and table.labels_above.sampling:
+        is_empty = heading.role == "time" and table.first_row[index] == ""
+        if is_empty and all(row[index] == "" for row in table.first_rows) and table.labels_above.sampling:
             continue  # the X_Value of LabVIEW, whose step is stated above
         role, column = heading.role, column_of(table, heading, index, stated_units.get(heading.role))
         if heading.extreme:

@@ -108,9 +108,9 @@ def _locate(
         try:
             for source in opened.parts:
                 mark = "" if isinstance(source, Sheet) else DELIMITERS.get(stated.delimiter or "")
-                layout = source.layout or find_layout(source.head(), vocabulary, mark, stated.header_line)
+                layout = source.layout or find_layout(source.head, vocabulary, mark, stated.header_line)
                 if not stated.header_line and (long := reshaped(source, layout, vocabulary)):
-                    source, layout = long, find_layout(long.head(), vocabulary, "")
+                    source, layout = long, find_layout(long.head, vocabulary, "")
                 located.append(((source, layout), combined(source, layout, vocabulary)))
         except csv.Error as error:
             raise MeasurementError("the table cannot be read", file=opened.file, found=str(error)) from error

@@ -70,8 +70,7 @@ _CHANNEL = re.compile(r"\((?:[^()]|\([^()]*\))*[:|](?:[^()]|\([^()]*\))*\)")
 _TAN = re.compile(r"(?i)\btan\s*\(\s*(delta|d|δ)\s*\)")
 #: Logarithm of a quantity: "log10 f [Hz]", "lg(G') [Pa]", "log10(K*/(N/m))". The base of a plain log is not known.
 _LOGARITHM = re.compile(
-    r"\s*(?P<kind>log[\s_]?10|lg|ln|log)(?=[\s_(])[\s_]*(?:\((?P<inner>(?:[^()]|\([^()]*\))*)\))?",
-    re.IGNORECASE,
+    r"(?i)\s*(?P<kind>log[\s_]?10|lg|ln|log)(?=[\s_(])[\s_]*(?:\((?P<inner>(?:[^()]|\([^()]*\))*)\))?"
 )
 #: Logarithm in a unit: "log10(Pa)", "ln(Pa)", "dB re 1 N/mm", "dB (N/mm)".
 _LOGARITHM_OF_UNIT = re.compile(
@@ -234,8 +233,7 @@ class Vocabulary:
         text = _DECIBELS.sub(r" [dB \1]", text)
         logarithm = 0.0
         if match := _LOGARITHM.match(text):
-            kind = match["kind"].lower()
-            logarithm = {"ln": 2.718281828459045, "log": float("nan")}.get(kind, 10.0)
+            logarithm = {"ln": 2.718281828459045, "log": float("nan")}.get(match["kind"].lower(), 10.0)
             text = f"{(match['inner'] or '').replace('/', ' ', 1)} {text[match.end() :]}".strip()
         if plain(header) in self._stated:  # a campaign may name a header together with its unit
             name, unit, convention = split_unit(text)
@@ -322,6 +320,7 @@ def split_convention(text: str) -> tuple[str, AmplitudeConvention | None]:
     return _split_off(text, _CONVENTIONS)
 
 
+@lru_cache(maxsize=4096)
 def split_extreme(text: str) -> tuple[str, Extreme | None]:
     """Split "Disp max [mm]" into "Disp [mm]" and "maximum"; None for a text without such a word."""
     return _split_off(text, _EXTREMES)
@@ -393,6 +392,7 @@ def _splits(text: str) -> Iterator[tuple[str, str | None, bool]]:
                 yield name[: end.start()], text, False
 
 
+@lru_cache(maxsize=4096)
 def _folded(text: str) -> str:
     """Text in lower case without accents, with the same number of characters; syllables of Hangul stay whole."""
     return "".join(

@@ -8,6 +8,7 @@ import re
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import islice
 from typing import Any, NamedTuple
 
@@ -48,8 +49,9 @@ class Text:
     numeric: frozenset[int] = frozenset()
     hidden: tuple[int, ...] = ()
 
+    @cached_property
     def head(self) -> list[Line]:
-        """Return the first non-empty lines of the text, which can contain the header."""
+        """First non-empty lines of the text, which can contain the header."""
         return list(islice(_non_empty_lines(io.BytesIO(self.data[:HEAD_BYTES]), 0), MOST_HEAD_LINES))
 
     def lines(self, after: int) -> Iterator[Line]:
@@ -180,8 +182,9 @@ class Sheet:
         """Return True: cells of a sheet may contain any sign."""
         return True
 
+    @cached_property
     def head(self) -> list[Line]:
-        """Return the lines above the table, and the first non-empty rows, which can contain the header."""
+        """Lines above the table, and the first non-empty rows, which can contain the header."""
         return [*self.above, *islice(self.lines(0), MOST_HEAD_LINES)]
 
     def tail(self) -> Iterator[Line]:

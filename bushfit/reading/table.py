@@ -132,8 +132,8 @@ class Table:
     @cached_property
     def first_row(self) -> Sequence[str | float]:
         """Cells of the first row of data in the table, with numbers if there is one; empty cells without rows."""
-        rows = [cells for _, cells in islice(self.rows(), _MOST_TEXT_ROWS)] or [[""] * len(self.headers)]
-        return next((row for row in rows if is_row(list(map(str, row)))), rows[0])
+        rows = (cells for _, cells in islice(self.rows(), _MOST_TEXT_ROWS) if is_row(list(map(str, cells))))
+        return next(rows, None) or next((cells for _, cells in self.rows()), [""] * len(self.headers))
 
     @cached_property
     def first_rows(self) -> list[Sequence[str | float]]:

@@ -119,7 +119,7 @@ def unpivot(source: RowSource, layout: Layout, file: Path, vocabulary: Vocabular
         first = next((column for column, text in enumerate(texts) if text), 0)
         return first if is_row(texts) and is_like_number(texts[first]) else None
 
-    cells = [(line.number, cells_of(line, mark)) for line in source.head() if not is_comment(line.content, mark)]
+    cells = [(line.number, cells_of(line, mark)) for line in source.head if not is_comment(line.content, mark)]
     width = max((len(row) for _, row in cells), default=0)
     lines = [Line(number, [*row, *[""] * (width - len(row))]) for number, row in cells]
     columns, texts, directions = list[_WideColumn](), list[str](), dict[Direction, None]()
