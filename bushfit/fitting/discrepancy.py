@@ -92,14 +92,13 @@ class FittedTests:
         return np.concatenate(slopes, axis=-1) * self.solution.coordinates.slopes(model.values)[moving, None]
 
     @cached_property
-    def _loop_directions(self) -> list[Array | None]:
-        """Orthonormal basis of the two changes that each loop's n residuals can have, (n, 2); None for a sweep."""
+    def _loop_factors(self) -> dict[int, tuple[Array, Array]]:
+        """QR factors, (n, 2) and (2, 2), of the two changes that the n residuals of a loop can have, by its index."""
         units = np.ones(self.directions.size) * np.array([[1.0], [1.0j]])
         changes = self.residual_changes(units / self._stiffness)
-        return [
-            np.linalg.qr(changes[:, block].T)[0] if test.kind == "loop" else None
-            for test, block in zip(self.data_sets, residual_slices(self.data_sets), strict=True)
-        ]
+        blocks = residual_slices(self.data_sets)
+        loops = [index for index, test in enumerate(self.data_sets) if test.kind == "loop"]
+        return {index: np.linalg.qr(changes[:, blocks[index]].T) for index in loops}
 
     def project(self, rows: Array) -> Array:
         """Reduce whitened residuals of all tests, (..., n), to the d components that the model's stiffness can change.
@@ -107,24 +106,29 @@ class FittedTests:
         Returns:
             Components, (..., d): all residuals of a sweep, and two combinations of the residuals of a loop.
         """
-        pairs = zip(residual_slices(self.data_sets), self._loop_directions, strict=True)
-        parts = [rows[..., block] if basis is None else rows[..., block] @ basis for block, basis in pairs]
+        parts = [rows[..., block] for block in residual_slices(self.data_sets)]
+        for index, (basis, _) in self._loop_factors.items():
+            parts[index] = parts[index] @ basis
         return np.concatenate(parts, axis=-1)
 
-    def residual_changes(self, shapes: Array) -> Array:
-        """Convert relative changes of the stiffness into changes of all n whitened residuals.
+    def residual_changes(self, shapes: Array, *, reduced: bool = False) -> Array:
+        """Convert relative changes of the stiffness into changes of the whitened residuals.
 
         Args:
             shapes: c relative changes of the stiffness at the operating points, complex (c, p).
+            reduced: True for the changes of the d components of `project`, False for those of all n residuals.
 
         Returns:
-            Changes of the residuals, (c, n).
+            Changes, (c, n) or (c, d).
         """
         ends = np.cumsum([test.frequency.size for test in self.data_sets])[:-1]
-        pairs = zip(self.data_sets, np.split(shapes * self._stiffness, ends, axis=1), strict=True)
-        changes = [test.residual_change(change, self.solution.model) for test, change in pairs]
-        if self.rig_errors:
-            changes = [errors.whiten(change) for errors, change in zip(self.rig_errors, changes, strict=True)]
+        changes = list[Array]()
+        for index, change in enumerate(np.split(shapes * self._stiffness, ends, axis=1)):
+            if reduced and index in self._loop_factors:
+                changes.append(np.concatenate((change.real, change.imag), axis=-1) @ self._loop_factors[index][1].T)
+            else:
+                rows = self.data_sets[index].residual_change(change, self.solution.model)
+                changes.append(self.rig_errors[index].whiten(rows) if self.rig_errors else rows)
         return np.concatenate(changes, axis=-1)
 
     @cached_property
@@ -205,7 +209,7 @@ class Discrepancy:
     @cached_property
     def columns(self) -> Array:
         """Changes of the d components of the residuals by each complex shape of the process, (2 q, d)."""
-        return self.tests.project(self.tests.residual_changes(self.complex_shapes))
+        return self.tests.residual_changes(self.complex_shapes, reduced=True)
 
     @cached_property
     def likelihood(self) -> RestrictedLikelihood:
