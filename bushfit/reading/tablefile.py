@@ -89,14 +89,14 @@ def _texts(column: pd.Series[Any], point: str) -> list[str]:
         return texts if point == "." else [text.replace(".", point) for text in texts]
 
     def cell_text(value: object) -> str:
-        """Text of a cell that may be a number, a text or None."""
+        """Text of a cell that may be a number or a text."""
         if isinstance(value, float):
-            return "" if value != value else f"{value:z.7g}".replace(".", point)
-        if isinstance(value, str):
-            return escape_formula(value)
-        return "" if value is None else str(value)
+            return f"{value:z.7g}".replace(".", point)
+        return escape_formula(value) if isinstance(value, str) else str(value)
 
-    return [cell_text(value) for value in column.tolist()]
+    codes, distinct = column.factorize()  # most columns of texts repeat a few; None and NaN have the code -1
+    texts = [*map(cell_text, distinct.tolist()), ""]
+    return [texts[code] for code in codes.tolist()]
 
 
 @lru_cache(maxsize=4096)
