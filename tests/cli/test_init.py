@@ -125,17 +125,6 @@ def test_a_direction_that_is_stated_contradicts_no_file(typed, tests, tmp_path, 
     typed("init", "bench/plain.csv", *GEOMETRY, "--direction", other, "-o", "y")
 
 
-@pytest.mark.parametrize(
-    ("files", "said"),
-    [
-        (["data/cmp_15961_raw/stepped_sine_axial.csv"], "is a raw stepped-sine history"),
-        (["data/cmp_15961/loop_axial_1.csv"] * 2, "a file is given twice"),
-    ],
-)
-def test_what_cannot_be_a_campaign(typed, root, tmp_path, files, said):
-    refused(typed("init", *(root / file for file in files), *GEOMETRY, "-o", "x", status=2), tmp_path / "x", said)
-
-
 def test_a_time_that_does_not_go_with_the_rows_is_told_by_every_fit(typed, tests, tmp_path):
     """A sine recorded without time, of which a rate was stated; silence where the time is as the rows lie."""
     loop = pd.read_csv(tests[0])

@@ -55,8 +55,8 @@ def transcript(folder: Path, commands: str) -> Iterator[str]:
 
 @pytest.mark.parametrize("name", some(CASES, [name for name, case in CASES.items() if not case.get("slow")]))
 def test_commands_print_and_write_what_the_references_hold(name, root, tmp_path, file_regression):
-    for folder in ("configs", "data"):
-        (tmp_path / folder).symlink_to(root / folder)
+    for folder in ("configs", "data", "tests/files/visit"):
+        (tmp_path / Path(folder).name).symlink_to(root / folder)
     for campaign, text in CAMPAIGNS.items():
         (tmp_path / f"{campaign}.toml").write_text(Template(text).substitute(PARTS), encoding="utf-8")
     with mock.patch("bushfit.report.plots.style.to_image", describe_figure):
