@@ -290,7 +290,9 @@ class BatchResult:
         """
 
         def listed(names: Sequence[str]) -> str:
-            """Join up to ten names, and state how many more there are."""
+            """Join up to ten names, and state how many more there are; of all parts, only their number."""
+            if len(names) == len(parts) > 1:
+                return f"all {len(parts)} parts"
             more = f" and {len(names) - _NAMES_LISTED} more" if len(names) > _NAMES_LISTED else ""
             return ", ".join(names[:_NAMES_LISTED]) + more
 
@@ -308,7 +310,7 @@ class BatchResult:
             if not (part.poor_fit or record.verdict or _MISFITS.isdisjoint(part.warning_kinds))
         ]
         if missing:
-            sentence = f"the tests of {listed(missing)} deviate from the model by more than noise and 1 %"
+            sentence = f"the tests of {listed(missing)} deviate from the model by more than noise explains"
             warnings.append(Caveat("part_misfit", f"{sentence}: --command diagnose looks for the cause"))
         if lacking := [part.name for part, lacks in zip(parts, self.lacks_sweep, strict=True) if lacks]:
             sentence = f"no sweep, unlike the other parts, and so not compared with them: {listed(lacking)}"

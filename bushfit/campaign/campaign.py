@@ -148,6 +148,10 @@ def _read_file(path: Path) -> CampaignFile:
         case {"file": str(law)}:
             with error_location(path, place="[effects]"):
                 register_file(Path(os.path.normpath(path.parent / law)))
+    match tables:
+        case {"bushings": [{"campaign": _}, *_]}:
+            hint = f"bushfit batch {quote_path(path)} evaluates the list"
+            raise CampaignError("a campaign is needed", file=path, found="a list of campaigns", hint=hint)
     return validate_tables(tables, path, CampaignFile)
 
 

@@ -13,11 +13,14 @@ from bushfit.cli.options import command_called, file_option, option, option_grou
 from bushfit.cli.output import Output, with_output
 from bushfit.cli.printing import print_parameters, print_tests, print_validations
 from bushfit.cli.shared_options import campaign_options, exit_above, open_campaign, quantity
+from bushfit.units import number
 
 if TYPE_CHECKING:
     from bushfit.commands.diagnose import DiagnosisOutput
     from bushfit.diagnosis.document import EffectEntry
 
+#: Title of the regions in which model and tests disagree.
+_WHERE = "where; x noise: the smooth part of the gap relative to its noise, which is smaller than that of a point"
 #: Terminal colours of the verdicts.
 _COLOURS = {"consistent": "green", "named": "green", "unexplained": "red"}
 
@@ -77,21 +80,21 @@ def command(
 def print_diagnosis(output: Output, diagnosed: DiagnosisOutput) -> None:
     """Print a diagnosis: verdict, gap (root mean square residual in units of noise), next test, and details."""
     from bushfit.effects import BASE
+    from bushfit.effects.unnamed import effect_label
 
     diagnosis = diagnosed.diagnosis
     print_verdict(output, diagnosed)
     print_findings(output, diagnosed)
     print_validations(output, diagnosed.validations, diagnosed.validations_before)
     for effect in diagnosed.document["effects"] if diagnosis.verdict != "ambiguous" else ():
-        output.console.print(f"  [bold]why {effect['name']}:[/bold] {escape(effect['evidence'])}")
+        output.console.print(f"  [bold]why {effect_label(effect['name'])}:[/bold] {escape(effect['evidence'])}")
     print_tests(output, (), diagnosis.result.usable)
     if output.verbose:
         title = "candidates: reduction of chi-square (gain) and probability that the effect is missing in the model"
         fitted = ((candidate, candidate.gain) for candidate in diagnosis.candidates if candidate.gain is not None)
         rows = ((one.name, one.why, f"{gain:.0f}", f"{one.probability:.2f}") for one, gain in fitted)
         output.print_table(title, ("candidate", "why", "gain", "probability"), rows, text_columns=2)
-    has_more = tuple(diagnosis.result.model.effects) != BASE
-    if has_more or output.verbose:
+    if tuple(diagnosis.result.model.effects) != BASE or output.verbose:
         print_parameters(output, "fitted model", diagnosis.result)
     output.warn(diagnosis.warnings)
 
@@ -116,11 +119,11 @@ def print_findings(output: Output, diagnosed: DiagnosisOutput) -> None:
     for effect in document["effects"]:
         _print_effect(output, effect)
     _print_gap(output, document, diagnosis.changed)
-    for title, regions in (("where", diagnosis.where), ("what remains", diagnosis.remainder)):
+    for title, regions in ((_WHERE, diagnosis.where), ("what remains", diagnosis.remainder)):
         if regions and not (title == "what remains" and diagnosis.remainder == diagnosis.where):
             console.print(f"  [bold]{title}[/bold]")
             for region in regions:
-                console.print(f"    {region.excess:5.1f} x noise: {escape(region.reading)}")
+                console.print(f"    {number(region.excess, 2):>5} x noise: {escape(region.reading)}")
     if diagnosis.next_test:
         console.print(f"  [bold]next test:[/bold] {escape(diagnosis.next_test)}")
 
@@ -150,12 +153,14 @@ def _print_gap(output: Output, document: Mapping[str, Any], changed: bool) -> No
 
 def _print_effect(output: Output, effect: EffectEntry) -> None:
     """Print one named effect: description, parameter values, and effects that the tests cannot distinguish from it."""
+    from bushfit.effects.unnamed import effect_label
     from bushfit.report.parameters import effect_sizes
 
     console = output.console
     test = f" in {effect['test']}" if effect["test"] else ""
     level = "bushing or rig" if effect["level"] == "unresolved" else effect["level"]
-    console.print(f"  [bold]{effect['name']}[/bold]{escape(test)} ({level}): {escape(effect['sentence'])}")
+    name = effect_label(effect["name"])
+    console.print(f"  [bold]{name}[/bold]{escape(test)} ({level}): {escape(effect['sentence'])}")
     for parameter, value, interval in effect_sizes(effect):
         console.print(f"    {parameter} = {value}, {f'95 % {interval}' if interval else 'no interval'}")
     if effect["twins"]:

@@ -49,7 +49,7 @@ _Read = TypeVar("_Read")
     option("--inner-diameter LENGTH", 'Radius or diameter where the rubber meets the inner sleeve, such as "20 mm".'),
     option("--outer-radius LENGTH"),
     option("--outer-diameter LENGTH", 'Radius or diameter where the rubber meets the outer sleeve, such as "36 mm".'),
-    option("--length LENGTH", 'Length of the rubber along the axis, such as "34 mm" (mean of both sleeves).'),
+    option("--length LENGTH", 'Length of the rubber along the axis, such as "34 mm" (mean of inner and outer length).'),
     option("--name NAME", "Name of the bushing [name of the folder of the first file]."),
 )
 @metadata_options()

@@ -180,7 +180,7 @@ def _print_tests(output: Output, plan: Plan) -> None:
 def _listed(values: Sequence[float], factor: float) -> str:
     """Format values times a factor: up to six values in full, more as the first, the last and their number."""
     words = [number(factor * value, 3) for value in values]
-    return ", ".join(words) if len(words) <= _MOST_VALUES else f"{words[0]} to {words[-1]} ({len(words)})"
+    return ", ".join(words) if len(words) <= _MOST_VALUES else f"{words[0]} to {words[-1]}, {len(words)} values"
 
 
 def _percents(rows: Mapping[str, Mapping[str, Any]], keys: Sequence[str]) -> list[tuple[str, ...]]:
@@ -196,7 +196,7 @@ def _print_effects(output: Output, document: PlanFile) -> None:
     printed = ranked if output.verbose else ranked[:_MOST_EFFECTS]
     title = (
         "smallest amount of an effect that the tests detect (probability 90 %, and above the errors of the rig): "
-        f"{len(printed)} of {len(ranked)} effects"
+        f"{len(printed)} of {len(ranked)} effects{'; -v lists all' * (len(printed) < len(ranked))}"
     )
     rows = []
     for name, amounts in printed:

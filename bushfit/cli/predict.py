@@ -138,8 +138,8 @@ def _print_summary(output: Output, predicted: PredictionOutput) -> None:
     if warnings := predicted.warnings:
         verdict += f", with {len(warnings)} warning{'s' * (len(warnings) > 1)}"
         first = min(warnings, key=attrgetter("rank"))
-        subject = f"{first.subject}: " if first.subject in places else ""
-        action = f"first warning below: {subject}{first.consequence}"
+        subject = f" ({first.subject})" if first.subject in places else ""
+        action = f"first warning below{subject}: {first.consequence}"
     output.print_headline(predicted.result.name, verdict, action)
     for prediction in predicted.predictions:
         force, loss = prediction.direction.display.stiffness, prediction.loss_factor.value

@@ -30,6 +30,7 @@ def print_validations(output: Output, validations: Sequence[Validation], before:
         table = validation_table(validations, before)
         rows = [(*row[:2], *(number(value, 3) for value in row[2:])) for row in table.itertuples(index=False)]
         title = "validation records (never fitted): predicted force compared with measured force"
+        title += "; before: without the diagnosis" * bool(before)
         output.print_table(title, list(table.columns), rows, text_columns=2)
     for validation in validations:
         source = validation.record.source
@@ -59,7 +60,7 @@ def print_result(output: Output, title: str, result: Result) -> None:
     print_parameters(output, title, result)
     if quality := result.quality:
         gain = quality.loop_gain_error
-        of_loops = " (here and below, 2 for each loop: its first harmonic)" if result.model.unnamed and gain else ""
+        of_loops = " (of a loop, only the first harmonic counts)" if result.model.unnamed and gain else ""
         loops = f", gain error of a loop {number(100 * gain, 2)} % ([rig] gain_error)" if gain else ""
         output.print(
             f"NRMSE {number(100 * quality.nrmse, 2)} %, reduced chi-square {number(quality.reduced_chi_square, 3)} "

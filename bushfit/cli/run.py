@@ -39,7 +39,7 @@ def command(campaigns: tuple[Path, ...], loss: Loss | None, max_nrmse: float | N
     """
     from bushfit.commands.provenance import input_files
     from bushfit.commands.run import run
-    from bushfit.effects.unnamed import NAME as UNNAMED
+    from bushfit.effects.unnamed import effect_label
 
     campaign = open_campaign(campaigns)
     folder = output.folder(campaign.name, "model.json", "diagnosis.json")
@@ -47,9 +47,9 @@ def command(campaigns: tuple[Path, ...], loss: Loss | None, max_nrmse: float | N
     output.warn(outcome.data.notes)
     diagnosis, description = outcome.diagnosed and outcome.diagnosed.diagnosis, "the joint fit"
     if diagnosis and diagnosis.added:
-        added = [name for name in diagnosis.result.model.effects if name not in diagnosis.before.model.effects]
-        effects = ", ".join("a smooth correction" if name == UNNAMED else name for name in added)
-        description = f"with {effects}; joint.json: the fit without effects"
+        effects, before = diagnosis.result.model.effects, diagnosis.before.model.effects
+        added = [effect_label(name) for name in effects if name not in before]
+        description = f"with {', '.join(added)}; joint.json is the fit without {'it' if len(added) == 1 else 'them'}"
     elif diagnosis and diagnosis.changed:  # a mistake in the record is named
         description += " to the uncorrected tests: correct the record first, then run again"
     print_run(output, campaign.name, outcome, f"use {folder / 'model.json'}, {description}")
@@ -71,7 +71,7 @@ def print_run(output: Output, name: str, outcome: RunOutput, action: str) -> Non
         print_verdict(output, diagnosed, action)
     else:
         output.print_headline(name, "every parameter is fixed, so there is nothing to diagnose", action)
-    print_result(output, f"{name}: {'model with the added effects' if outcome.added else 'joint fit'}", result)
+    print_result(output, f"{name}: {'model to use' if outcome.added else 'joint fit'}", result)
     if diagnosed and (output.verbose or diagnosed.diagnosis.verdict != "consistent"):
         print_findings(output, diagnosed)
     _print_range(output, outcome)

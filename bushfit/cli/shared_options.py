@@ -122,7 +122,7 @@ def prediction_options(campaign: str, *, static: bool = False) -> Parameter:
     return option_group(
         "Range and conditions",
         direction_option("predict", "axial and radial, and all specimens"),
-        grid_options("from the campaign, else as tested", static=static),
+        grid_options("from the campaign, else as tested, else as in the paper", static=static),
         TEMPERATURE,
         file_option("--campaign", campaign),
     )

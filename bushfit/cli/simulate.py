@@ -35,8 +35,8 @@ if TYPE_CHECKING:
             ("noise SHARE", "1", 'Random error of each sweep point, relative to the stiffness |K|: "0.5 %".'),
             ("force-noise SHARE", "1", 'Noise of the force in loops, relative to half its range: "0.3 %".'),
             ("displacement-noise SHARE", "1", 'Displacement noise in loops, relative to the amplitude: "0.02 %".'),
-            ("gain-error SHARE", "1", 'Gain error of all points of a run (one repeat of one amplitude): "0.4 %".'),
-            ("phase-error ANGLE", "rad", 'Phase error of all points of a run, drawn for each run: "0.2 deg".'),
+            ("gain-error SHARE", "1", 'Random gain error of each run (one repeat of one amplitude): "0.4 %".'),
+            ("phase-error ANGLE", "rad", 'Random phase error of each run: "0.2 deg".'),
         )
     ),
 )
@@ -64,7 +64,7 @@ def command(source: Path, effects: tuple[str, ...], output: Output, **settings: 
     with error_location(source):
         result, document, files = simulate_campaign(truth, replace(tests, **changes), fitted, output.formats.table_form)
     if truth.unnamed:
-        sentence = "the unnamed correction is left out, because it applies only to steady states, not in time"
+        sentence = "the smooth correction is left out, because it applies only to steady states, not in time"
         output.warn([Caveat("correction_not_simulated", sentence)])
     folder = output.folder(result.name, *(file.name for file in files))
     output.print(result.model.equation())

@@ -72,7 +72,7 @@ class DiagnosisOutput:
         if self.diagnosis.verdict == "named" and not any(level_of(e.name) in ("record", "unresolved") for e in causes):
             return ""
         labels = [entry.label for entry in causes]
-        return f"if {' and '.join(labels)} is confirmed: {' --adopt '.join([self.command, *labels])}" if labels else ""
+        return f"if tests confirm {' and '.join(labels)}: {' --adopt '.join([self.command, *labels])}" if labels else ""
 
     @property
     def result(self) -> Result:

@@ -97,7 +97,8 @@ def describe(
     if beside_effects.parts and max(excess[1], 0.0) > remaining_share * excess[0]:
         return None
     half = Z95 * correction.uncertainty * correction.largest
-    sentence = f"up to {number(100.0 * correction.largest, 2)} ± {number(100.0 * half, 2)} % of |K|"
+    largest, error = (number(100.0 * size, 2) for size in (correction.largest, half))
+    sentence = f"up to {largest} ± {error} % of |K| with refitted parameters"
     if not has_candidates:
         try:
             problem = FitProblem.with_fixed(fit.model, harmonic, fit.fixed, bounds)
@@ -109,7 +110,7 @@ def describe(
         law = nearest_power_law(base, rig, start, bounds)
         if law and law.is_likely and any(law.determined):
             description = Description(law.phase_deg, law.frequency_power, law.amplitude_power, law.sentence)
-        sentence += f"; {description.words if description else 'its form is not a power law'}"
+            sentence += f"; {law.sentence}"
     model = replace(fitted.model, effects=(*fit.model.effects, NAME), unnamed=correction)
     after, whole = plain.reevaluate(model, harmonic), plain.reevaluate(model, fit.data_sets)
     holdout = beside_effects if before is None else _hold_out_inside(before, closest, correction)
@@ -175,7 +176,7 @@ def _validity(correction: Unnamed, whole: FitResult) -> str:
     misfit = max((region.excess for region in find_regions(whole) if region.kind == "loop"), default=0.0)
     stays = f" (the form of loops still differs by {number(misfit, 2)} times the noise)" if misfit else ""
     loops = f"; in loops, it changes the first harmonic only{stays}" if split_by_kind(whole.data_sets)[0] else ""
-    return f"valid only for this bushing and between these tests ({patches}){loops}"
+    return f"no effect explains it; valid only for this bushing and between these tests ({patches}){loops}"
 
 
 @dataclass(frozen=True, eq=False)

@@ -35,7 +35,7 @@ def undecided_text(reported: Sequence[Composition]) -> str:
     """Return a sentence on the explanations that the tests cannot distinguish, and on the parts they share."""
     parts = [[label.replace("fault: ", "a fault of ") for label in composition.labels] for composition in reported]
     shared = [name for name in parts[0] if all(name in names for names in parts)]
-    common = f"all probable explanations contain {' and '.join(shared)}"
+    common = f"{' and '.join(shared)} {'is' if len(shared) == 1 else 'are'} part of every probable explanation"
     rests = [" + ".join(name for name in names if name not in shared) for names in parts]
     if "" in rests:
         return f"{common}; a further cause is possible: {' or '.join(filter(None, rests))}"
@@ -44,28 +44,23 @@ def undecided_text(reported: Sequence[Composition]) -> str:
 
 
 def causes_text(candidates: Sequence[Composition], finding: Finding) -> list[str]:
-    """List sentences on the possible causes of a gap.
+    """List at most one sentence on the possible causes of a gap, beside the lines with their probabilities.
 
     Args:
         candidates: explanations by effects or recording mistakes, the most probable first.
         finding: verdict, with all reported explanations and its leads (effects that reduce the gap without closing it).
 
     Returns:
-        If every reported explanation is a recording mistake, one sentence that asks to check them. Otherwise a sentence
-        on the candidates with their probabilities, and one on the leads that no candidate contains.
+        If every reported explanation is a recording mistake, a sentence that asks to check them. Otherwise a sentence
+        on the leads that no candidate contains, or that there are neither candidates nor leads; else nothing.
     """
     claims = {c.best.claim.key if c.best.claim else None: c.best.claim for c in finding.reported}
     if all(claims.values()):
         return [f"check first whether {' or whether '.join(claim.sentence for claim in claims.values() if claim)}"]
-    names = [
-        f"{candidate.best.claim.sentence if candidate.best.claim else candidate.label} "
-        f"({format_probability(candidate.probability)})"
-        for candidate in candidates
-    ]
-    sentences = [f"possible cause: {' or '.join(names)}"] if names else []
     leads = [name for name in finding.leads if not any(name in candidate.causes for candidate in candidates)]
-    sentences += [f"leads: {' and '.join(leads)}"] if leads else []
-    return sentences or ["no known effect explains the gap"]
+    if leads:
+        return [f"the gap is smaller with {' and '.join(leads)}"]
+    return [] if candidates else ["no known effect explains the gap"]
 
 
 def explanation_odds(finding: Finding) -> Odds:

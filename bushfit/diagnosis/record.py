@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 #: Probability above which no further digits are shown.
 _NEARLY_ONE = 0.995
 #: Meaning of the probability of an explanation.
-_MEANING = "Probability: chance that the cause is present, alone or together with further causes."
+_MEANING = "Each probability includes the case that further causes are present."
 #: Probability below which other explanations are not mentioned.
 _LEAST_REPORTED = 0.01
 

@@ -168,7 +168,8 @@ class DiagnosisWriter:
         gap, candidates = closing.gap, self._candidates
         advice = self._deciding_advice(candidates[0] if candidates else first)
         if leads := [f"--adopt {name}" for name in self.finding.leads if get_mistake(name) is None]:
-            advice = "; ".join(filter(None, (advice, f"to try the leads: bushfit diagnose CAMPAIGN {' '.join(leads)}")))
+            trial = f"without a test, try: bushfit diagnose CAMPAIGN {' '.join(leads)}"
+            advice = "; ".join(filter(None, (advice, trial)))
         parts = {part.name for part in first.best.faulty_parts}
         at_fault, is_faulty = " and ".join(sorted(parts)), self.finding.verdict == "unexplained"
         if not gap and not first.best.unnamed and first.best.p_value >= DOES_NOT_FIT:

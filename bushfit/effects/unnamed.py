@@ -212,9 +212,14 @@ def first_harmonic(values: Values, below: ForceBelow, displacement: History, set
     return force + np.real(share * displacement.with_value(force).fundamental)
 
 
+def effect_label(name: str) -> str:
+    """Name of an effect in texts for users; the unnamed correction is "a smooth correction"."""
+    return "a smooth correction" if name == NAME else name
+
+
 EFFECT = Layer(
     name=NAME,
-    sentence="A smooth correction over frequency and amplitude that no effect of the library explains.",
+    sentence="A smooth function of frequency and amplitude corrects the stiffness.",
     equation="(1 + c(ln f, ln X)) K",
     level=Level.COMPONENT,
     parameters=(),

@@ -85,7 +85,7 @@ class Covariance:
         if curve.names and deviations @ deviations <= chdtri(len(curve.names), 0.05):
             names.append("preload")
         unknown = ", ".join(names)
-        return unknown and f"the tests do not determine {unknown} (95 % interval of +-100 % or more)"
+        return unknown and f"the tests do not determine {unknown} (95 % interval of ±100 % or more)"
 
     def freedom(self, slopes: Array) -> Array:
         """Effective degrees of freedom of the variances of n quantities, (n,), for Student's t.

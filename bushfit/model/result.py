@@ -350,7 +350,7 @@ class Result:
         sentence = "the tests permit other values of the parameters"
         if names:
             share = 100.0 * sum(one.probability for one in rivals)
-            sentence = f"the prediction uses {used}, but {' or '.join(names)} may be present (together {share:.0f} %)"
+            sentence = f"the prediction uses {used}, but may lack {' or '.join(names)} (probability {share:.0f} %)"
         return [Caveat("undecided", f"{sentence}: the bands, low to high, include each alternative")]
 
     @property

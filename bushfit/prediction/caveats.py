@@ -65,12 +65,12 @@ def caveats(result: Result) -> Iterator[Caveat]:
     if unnamed := result.model.unnamed:
         yield Caveat(
             "correction_fades",
-            "the unnamed correction follows the measurement, not a law. Outside the measured range, it fades "
-            f"and the band widens by up to +/-{number(100.0 * Z95 * unnamed.far_deviation, 2)} %",
+            "the smooth correction follows the measurement, not a law. Outside the measured range, it fades "
+            f"and the band widens by up to ±{number(100.0 * Z95 * unnamed.far_deviation, 2)} %",
         )
         yield Caveat(
             "correction_may_be_rig",
-            "the unnamed correction is assigned to the bushing, but these tests cannot distinguish it "
+            "the smooth correction is assigned to the bushing, but these tests cannot distinguish it "
             "from an effect of the rig. If it belongs to the rig, |K| of the bushing in the car differs by up to "
             f"{number(100.0 * unnamed.largest, 2)} %",
         )

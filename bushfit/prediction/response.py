@@ -240,8 +240,8 @@ def _warnings(result: Result, response: TimeResponse, left_out: list[str], tempe
         of_motion.append(Caveat("extrapolated_rate", sentence))
     if (result.model.unnamed or result.model_error) and "friction" in result.model.effects:
         sentence = (
-            "friction laws that agree in sines can differ in a mixed motion by more than the band. Compare "
-            "with a fit with --effect distributed_sliders, or with a measured force ([[validation]])"
+            "friction laws that agree in sines can differ in a mixed motion by more than the band. Judge the "
+            "model by a measured force ([[validation]]), or compare it with a fit with --effect distributed_sliders"
         )
         of_motion.append(Caveat("friction_laws_differ", sentence))
     if left_out:

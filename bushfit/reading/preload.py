@@ -47,10 +47,10 @@ def add_preload(text: str, preload: Preload | None, place: Place) -> str:
 
     Args:
         text: text on the test.
-        preload: preload of the test; None leaves the text as it is.
+        preload: preload of the test; None, or a preload of zero, leaves the text as it is.
         place: direction or specimen of the test.
     """
-    return f"{text} at a preload of {preload.text(place)}" if preload else text
+    return f"{text} at a preload of {preload.text(place)}" if preload and preload.value else text
 
 
 def parse_preload(text: str | None, place: Place) -> Preload | None:

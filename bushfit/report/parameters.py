@@ -25,10 +25,10 @@ class ParameterRow(NamedTuple):
 
     Args:
         name: name of the parameter.
-        state: "held" (fixed in the fit), "tied", "prior", "at min" or "at max" (at a bound); empty otherwise.
+        state: "fixed" in the fit, "tied", "prior", "at min" or "at max" (at a bound); empty otherwise.
         value: value in `unit`.
         error: standard error in `unit`; "fixed" if the parameter is tied to a constant; empty if it is not known.
-        interval: 95 % interval in `unit`, such as "1.02 to 1.10" or "open to 1.10"; empty if it is not known.
+        interval: 95 % interval in `unit`, "open to 1.10" or "not determined"; empty if it is not known.
         unit: display unit that value, error and interval share.
         meaning: description of the parameter.
     """
@@ -72,12 +72,13 @@ def parameter_rows(result: Result) -> Iterator[ParameterRow]:
             interval = (None, None)
         finite_ends = [end * factor for end in interval or () if end is not None]
         value_text, *texts = format_aligned([value * factor, *finite_ends], digits, minimum_digits=2)
-        ends = ["open" if end is None else texts.pop(0) for end in interval or ()]
+        interval_text = " to ".join("open" if end is None else texts.pop(0) for end in interval or ())
+        interval_text = "not determined" if interval_text == "open to open" else interval_text
         error = "fixed" * (stderr == 0.0) if not stderr else format_aligned([stderr * factor], 2)[0]
-        state = "prior" if name in result.priors else "held" * (name not in result.fitted and not stderr)
+        state = "prior" if name in result.priors else "fixed" * (name not in result.fitted and not stderr)
         state = "tied" if name in result.ties else state
         state = f"at {result.at_bound[name]}" if name in result.at_bound else state
-        yield ParameterRow(name, state, value_text, error, " to ".join(ends), unit, parameter.meaning)
+        yield ParameterRow(name, state, value_text, error, interval_text, unit, parameter.meaning)
 
 
 def effect_sizes(effect: EffectEntry) -> list[tuple[str, str, str]]:

@@ -18,7 +18,7 @@ REPEATS_OFF = "repeats differ as a whole by an error of"
 ROWS_APART = "repeats of the same points differ by up to"
 #: Files that run and diagnose write alike.
 ALIKE = ("diagnosis.json", "gap.csv", "candidates.csv")
-UNKNOWN = "the tests do not determine mu, m, alpha (95 % interval of +-100 % or more)"
+UNKNOWN = "the tests do not determine mu, m, alpha (95 % interval of ±100 % or more)"
 
 
 def test_the_dynamic_fit_takes_the_smallest_amplitude_of_all_sweeps(own):
@@ -166,7 +166,7 @@ def test_a_preload_without_influence_is_not_determined(own, tmp_path):
     for file, preload in ((SWEEP, "0 N"), (SWEEP.replace("sweep_axial", "loaded"), "500 N")):
         text += f'[[sweeps]]\nfile = "../{file}"\ndirection = "axial"\npreload = "{preload}"\n'
     (own / CAMPAIGN).write_text(f'{text}[fit]\neffects = ["preload"]\n', encoding="utf-8")
-    unknown = "the tests do not determine preload (95 % interval of +-100 % or more)"
+    unknown = "the tests do not determine preload (95 % interval of ±100 % or more)"
     for command in ("fit", "diagnose"):
         done = typing(own)(command, CAMPAIGN, "-o", tmp_path / command, "--no-plots")
         assert unknown in done.text.splitlines()[0]

@@ -117,7 +117,7 @@ def test_parameters_meet_the_truth_and_are_the_same_in_all_files(lab):
         scale = UNITS[words.split()[-1]]
         wanted = [scale * number for number in (value, error, low, high)]
         assert numbers(words)[:4] == pytest.approx(wanted, rel=0.05, abs=0.06 * scale * error), name
-    assert line(done, "rig_compliance.compliance (held)").split()[2:] == ["0.01000", "mm/kN"]
+    assert line(done, "rig_compliance.compliance (fixed)").split()[2:] == ["0.01000", "mm/kN"]
     correlation = saved["covariance"]["matrix"][0][1] / np.sqrt(covariance["mu"] * covariance["m"])
     assert f"mu/m {correlation:+.2f}" in line(done, "correlation: ")
 

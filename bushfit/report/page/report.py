@@ -14,6 +14,7 @@ import pandas as pd
 from bushfit.caveat import Caveat, to_caveats
 from bushfit.diagnosis.document import DiagnosisFile
 from bushfit.diagnosis.record import format_odds
+from bushfit.effects.unnamed import effect_label
 from bushfit.errors import ModelError
 from bushfit.geometry import STRAINING, TRANSLATION
 from bushfit.model.file import from_document, require_schema
@@ -99,6 +100,7 @@ def report_page(files: Sequence[ResultFile], date: str | None = None, folder: Pa
         "headlines": [headline_texts(result, prediction) for prediction in predictions],
         "agrees": agrees_within_noise,
         "sizes": effect_sizes,
+        "label": effect_label,
         "odds": format_odds(diagnosis) if diagnosis else [],
         "pictures": pictures,
         "left_out": left_out,

@@ -14,6 +14,7 @@ from matplotlib.colors import BoundaryNorm, ListedColormap
 
 from bushfit.effects.contract import Array
 from bushfit.effects.unnamed import NAME as UNNAMED
+from bushfit.effects.unnamed import effect_label
 from bushfit.geometry import Place
 from bushfit.model.result import Result
 from bushfit.report.plots import style
@@ -123,7 +124,7 @@ def column_titles(table: pd.DataFrame, result: Result, diagnosis: Mapping[str, A
         names = {"before": "tests as recorded", "after": "with the record corrected"}
     else:
         found = {UNNAMED, *(effect["name"] for effect in diagnosis["effects"])}
-        added = ["a smooth correction" if name == UNNAMED else name for name in result.model.effects if name in found]
+        added = [effect_label(name) for name in result.model.effects if name in found]
         names["after"] = f"after adding {' and '.join(added)}" if added else names["after"]
     gaps = diagnosis["gap"]["calibration"]
     tails = {side: f"\nfitted {gaps[side]:.2f} × noise" for side in names if gaps[side] is not None}
