@@ -181,7 +181,7 @@ SWEEP_FAULTS: dict[str, Callable[[Sweep], Sweep]] = {
     "possible causes: the phases of axial.csv are radians, not degrees (then, in the campaign: [[sweeps]] of axial": (
         lambda x: replace(x, stiffness=np.abs(x.stiffness) * np.exp(1j * np.radians(np.angle(x.stiffness))))
     ),
-    "causes: the phases of axial.csv are 90 deg less the loss angle (then, in the campaign: [[sweeps]] of axial": (
+    "causes: the phases of axial.csv are 90 deg minus the loss angle (then, in the campaign: [[sweeps]] of axial": (
         lambda x: replace(x, stiffness=1j * np.conj(x.stiffness * np.exp(0.2j)))
     ),
 }

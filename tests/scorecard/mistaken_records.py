@@ -94,7 +94,7 @@ for _name, _sentence, _chosen, _factors in (
     _register(_name, _sentence, _chosen, partial(_scaled, **_factors))
 for _name, _sentence, _form, _read in (
     ("phase_in_radians", "phases are radians", 1, lambda k: np.abs(k) * np.exp(1j * np.radians(np.angle(k)))),
-    ("complement", "phases are 90 deg less the loss angle", 1, lambda k: 1j * np.conj(k)),
+    ("complement", "phases are 90 deg minus the loss angle", 1, lambda k: 1j * np.conj(k)),
     ("loss_in_per_cent", "loss factors are per cent", 0, lambda k: _with_loss(k, 100.0 * k.imag / k.real)),
     ("loss_as_ratio", "loss factors were divided by 100", 0, lambda k: _with_loss(k, 0.01 * k.imag / k.real)),
     ("sin_delta", "loss factors are sin delta", 0, lambda k: _with_loss(k, k.imag / np.abs(k))),
