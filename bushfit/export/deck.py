@@ -298,5 +298,5 @@ def band_omissions(prediction: Prediction) -> Iterator[Caveat]:
         yield Caveat("format_omission", sentence).about(place)
     if prediction.if_in_rig:
         deviation = format_deviation(prediction.if_in_rig.stiffness.value / band.value)
-        sentence = f"if the unresolved effect belongs to the rig, |K| is {deviation}; these values are left out"
+        sentence = f"if the unassigned effect belongs to the rig, |K| is {deviation}; these values are left out"
         yield Caveat("format_omission", sentence).about(place)

@@ -91,7 +91,8 @@ def prediction_figure(
     if any(laid) and rig:
         sentences.append("Thin lines: the model with the effects of the rig, as the points were measured.")
     if fine.if_in_rig:
-        sentences.append("Double lines: the model if the unresolved effect belongs to the rig; the band includes both.")
+        names = " and ".join(result.unresolved)
+        sentences.append(f"Double lines: the model if {names} belongs to the rig; the band includes both.")
     if amplitudes.size > _MOST_LEVELS["frequency"]:
         sentences.append(f"{_MOST_LEVELS['frequency']} of {amplitudes.size} amplitudes are drawn.")
     if of_place is not None and (any(laid) or free):
