@@ -42,10 +42,13 @@ def manual_page() -> str:
     names, parser = page_names(), MarkdownIt("commonmark", {"html": False}).enable("table")
     chapters = []
     for name in names:
-        tokens = parser.parse((FOLDER / f"{name}.md").read_text(encoding="utf-8"))
+        text = re.sub("<!--.*?-->", "", (FOLDER / f"{name}.md").read_text(encoding="utf-8"))
+        tokens = parser.parse(text)
         title = _add_identifiers(tokens, name)
         for token in tokens:
             _redirect_links(token.children or (), name, names)
+            if token.type == "table_open":  # on a narrow screen it scrolls, also by keyboard
+                token.attrSet("tabindex", "0")
         chapters.append((name, title, Markup(parser.renderer.render(tokens, parser.options, {}))))
     return render_page("manual.html", {"chapters": chapters})
 
