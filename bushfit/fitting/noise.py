@@ -45,7 +45,7 @@ LineKey = tuple[str, float]
 _ORIGINS = {
     "repeats": "from repeats",
     "stated": "stated in the campaign",
-    "assumed": "without repeats: scatter about a smooth curve; gain and phase assumed: to state them, see [rig]",
+    "assumed": "without repeats: scatter about a smooth curve; gain and phase assumed, see [rig] in a campaign",
 }
 
 
@@ -91,7 +91,7 @@ class SweepNoise:
 
     def describe(self) -> str:
         """Describe size and origin of the sweeps' noise in one line for reports."""
-        shared = f"{format_class_errors(self.shared)} shared by all points of a run"
+        shared = f"{format_class_errors(self.shared)} shared by a run"
         if any(self.level):
             shared += f", {format_class_errors(self.level)} by all repeats of a level"
         point = 100.0 * np.sqrt(np.mean(np.square(list(self.random.values()))))

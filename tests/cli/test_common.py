@@ -282,7 +282,7 @@ def test_the_manual_is_one_file_whose_links_stay_in_it(bushfit, root, tmp_path):
     assert {target[1:] for target in targets if target.startswith("#")} <= set(identifiers)
     assert len(targets) > 30
     assert "src=" not in text
-    assert text.count("<table>") > 20
+    assert text.count("<table") > 20
 
 
 def test_the_example_runs_and_gives_back_its_parameters(bushfit, table_1, tmp_path):
