@@ -139,12 +139,12 @@ def _print_plan(output: Output, plan: Plan) -> None:
         output.print(f"{runs} reduce the standard error of the stiffness{included}: {', '.join(gains)}")
     output.print(f"starting point: {document['source']}")
     _print_tests(output, plan)
-    columns = ("quantity", "before", f"plan, {hours} h", f"standard, {number(document['hours_standard'], 3)} h")
+    error_columns = "quantity", "before", f"plan, {hours} h", f"standard, {number(document['hours_standard'], 3)} h"
     rows = {f"{name}{condition}": row for name, row in document["parameters"].items()}
     rows |= {f"stiffness, {place}{included}": row for place, row in document["stiffness"].items()}
     rows |= {f"loss factor, {place} [0.01]{included}": row for place, row in document["loss_factor"].items()}
     title = "standard errors [%]: before these tests, after the plan, and after the standard programme"
-    output.print_table(title, columns, _percents(rows, ("before", "planned", "standard")))
+    output.print_table(title, error_columns, _percents(rows, ("before", "planned", "standard")))
     if targets := document["targets"]:
         sizes = _percents(targets, ("asked", "before", "planned", "standard"))
         parameters = document["parameters"]
