@@ -50,7 +50,7 @@ _ENTITY = re.compile(r"&(?:#\d{1,5}|[A-Za-z]{2,8}\d?);")
 _READ_AS_CP1252 = re.compile(r"[Â-ß][^\x00-\x7f]|[à-ï][^\x00-\x7f]{2}")
 #: Characters without a width; characters of full or half width, and units of one character, such as mm and Hz.
 _INVISIBLE = re.compile("[\u200b-\u200f\u2060\ufeff]")
-_OTHER_WIDTH = re.compile("[\uff01-\uffee\u3300-\u33ff]+")
+_OTHER_WIDTH = re.compile("[\uff0c-\uff1a\uff21-\uff3a\uff41-\uff5a\uff66-\uff9f\u3300-\u33ff]+")
 #: Run of non-ASCII bytes.
 _HIGH_RUN = re.compile(rb"[\x80-\xff]+")
 #: Two bytes of GB2312: its punctuation and its 3755 commonest characters. Western accents make few such pairs.

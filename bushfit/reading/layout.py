@@ -9,7 +9,7 @@ Notes:
 
 import re
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import product, takewhile
 from typing import Annotated, Literal
@@ -40,6 +40,8 @@ _LINES_BELOW_HEADER = 8
 #: Names in the first cells of rows that describe the columns, such as "Unit" and "dx"; and of rows of units among them.
 UNIT_NAMES = frozenset(map(plain, WORDS["rows_of"]["units"]))
 _DESCRIPTIONS = UNIT_NAMES | frozenset(map(plain, WORDS["rows_of"]["descriptions"]))
+#: Names of a column with the size of one count of a channel.
+_SCALES = frozenset(map(plain, WORDS["rows_of"]["scales"]))
 #: Letter, which each name of a column has.
 _LETTER = re.compile(r"[^\W\d_]")
 #: A number with a number sign: "#1".
@@ -348,6 +350,8 @@ def _layout(
             units_line, row = below[0][0], [*cells, *row][: len(headers)]
         elif any(named) and [*map(bool, named)] == [*map(bool, cells)] and not vocabulary.roles(headers[: len(cells)]):
             units_line, headers = below[0][0], [*cells, *headers[len(cells) :]]
+    scaled = _scales_above((split(line.content, delimiter) for line in lines[:index]), headers)
+    row = [scaled.get(n, unit) for n, unit in enumerate(row)]
     below = below[len(described) :]
     widths = {len(cells) for _, cells in below if is_row(cells)}
     if described and widths == {len(headers) - 1}:  # the names of the rows have a column of their own
@@ -368,9 +372,32 @@ def _layout(
     levels = stated_once(headers, (split(content, delimiter) for content in contents), vocabulary)
     names = ", ".join(f'"{headers[index]}"' for index in sorted(levels))
     notes = (Caveat("cells_filled", f"{names}: an empty cell has the value of the cell above"),) if levels else ()
+    if scaled:
+        listed = ", ".join(f'"{headers[n]}" {text}' for n, text in scaled.items())
+        notes += (
+            Caveat("stated_unit", f"the lines above the table scale its columns: {listed}; offsets are left out"),
+        )
     return Layout(
         delimiter, tuple(headers), number, tuple(row), units_line, (), numbered, False, notes, levels, described_line
     )
+
+
+def _scales_above(lines: Iterable[Sequence[str]], headers: Sequence[str]) -> dict[int, str]:
+    """Find the scales of recorded counts in a table of channels above the data: "Name,Units,Scale" and a row for each.
+
+    Returns:
+        Scale with its unit, such as "x 0.00125 mm", by index of the header that names the channel.
+    """
+    scale = unit = None
+    scales = dict[int, str]()
+    for cells in lines:
+        names = list(map(plain, cells))
+        if _SCALES.intersection(names) and UNIT_NAMES.intersection(names):
+            scale, unit = (next(n for n, name in enumerate(names) if name in words) for words in (_SCALES, UNIT_NAMES))
+        elif scale is not None and unit is not None and len(cells) > max(scale, unit) and is_like_number(cells[scale]):
+            matching = [n for n, header in enumerate(headers) if header in cells]
+            scales |= dict.fromkeys(matching, f"x {cells[scale]} {cells[unit]}")
+    return scales
 
 
 def _is_labelled_units_row(cells: Sequence[str], width: int) -> bool:
