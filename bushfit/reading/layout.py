@@ -371,7 +371,8 @@ def _layout(
     )
     levels = stated_once(headers, (split(content, delimiter) for content in contents), vocabulary)
     names = ", ".join(f'"{headers[index]}"' for index in sorted(levels))
-    notes = (Caveat("cells_filled", f"{names}: an empty cell has the value of the cell above"),) if levels else ()
+    filled = Caveat("cells_filled", f"{names}: an empty cell has the value of the cell above")
+    notes = (filled,)[: bool(levels)]
     if scaled:
         listed = ", ".join(f'"{headers[n]}" {text}' for n, text in scaled.items())
         notes += (
