@@ -28,7 +28,7 @@ from bushfit.diagnosis.projected_columns import GroupSet
 from bushfit.diagnosis.propose import Proposal, has_used_parameters, proposals
 from bushfit.diagnosis.record import DiagnosisSettings
 from bushfit.diagnosis.recorded_tests import RecordedTests, modulus_deviation, record_change
-from bushfit.diagnosis.smooth_deviations import COMPOUND, POWER_LAW
+from bushfit.diagnosis.smooth_deviations import COMPOUND
 from bushfit.diagnosis.verdict import decide_verdict
 from bushfit.effects.mistakes import get_mistake
 from bushfit.errors import FitError, ModelError
@@ -162,10 +162,7 @@ class Search:
         finding = decide_verdict(self._ordered_hypotheses(), self.settings.tolerance)
         if finding.verdict == "consistent":
             return finding.nothing >= NAMED and self.root.linear.p_value() >= DOES_NOT_FIT
-        best = finding.reported[0].best
-        if best.last and best.last.family == POWER_LAW and len(best.key) == 1:
-            return finding.reported[0].probability >= NAMED and best.p_value >= DOES_NOT_FIT
-        return finding.verdict == "named" and best.refitted
+        return finding.verdict == "named" and finding.reported[0].best.refitted
 
     def _settle_linear(self) -> Iterator[Hypothesis]:
         """Yield the most probable hypotheses that need a refit: their evidence is still that of the linear model."""

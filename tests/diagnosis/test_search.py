@@ -63,7 +63,7 @@ def test_what_is_there_is_all_but_sure(diagnosed, truth):
     assert diagnosis.verdict == "named"
     assert names(diagnosis) == set(truth)
     assert diagnosis.odds.nothing < 1e-6
-    assert set(diagnosis.odds.labels[0].split(" + ")) == set(truth)
+    assert {*diagnosis.odds.labels[0]} == set(truth)
     assert diagnosis.odds.explanations[0][1] > 0.97
     assert diagnosis.result.model.effects[:3] == BASE
     assert diagnosis.calibration[1] < 1.1 < 1.2 < diagnosis.calibration[0]
@@ -82,7 +82,7 @@ def test_what_one_place_alone_shows_is_to_be_measured_again(measured, tamper, pl
     assert place in diagnosis.summary
     assert re.match(rf"{re.escape(place)}: a deviation of [\d.]+ % from all other tests", diagnosis.where[0].reading)
     assert diagnosis.next_test == f"measure again: {place}"
-    assert diagnosis.odds.labels[0] == f"fault: {place}"
+    assert diagnosis.odds.labels[0] == (f"fault: {place}",)
 
 
 def test_a_loop_at_an_amplitude_of_its_own_may_deviate_by_a_law(measured):
