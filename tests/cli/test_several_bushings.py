@@ -59,3 +59,9 @@ def test_a_history_moves_the_bushings_asked_for(shapes, tmp_path, history, direc
 def test_a_bushing_or_direction_that_is_not_there_is_one_error(shapes, tmp_path, command, problem):
     done = typing(shapes)(*shlex.split(command), "-o", tmp_path / "x", status=2)
     refused(done, tmp_path / "x", problem)
+
+
+def test_a_name_of_two_bodies_is_refused(root, tmp_path):
+    text = (root / "configs/three_shapes.toml").read_text(encoding="utf-8").replace("../data", f"{root}/data")
+    (tmp_path / "c.toml").write_text(text.partition("[simulate]")[0].replace('"thick"', '"long axial"'))
+    assert "two bodies have one name" in typing(tmp_path)("fit", "c.toml", "-o", "x", status=2).stderr

@@ -90,7 +90,7 @@ def test_every_command_is_among_them():
 UNEXPECTED = {
 
     "a rig or sleeve is too compliant to be simulated in time", "module | has no attribute", "no FMU for this system",
-    "no Dask worker is left", "no worker process starts", "not all cycles are steps",
+    "no Dask worker is left", "no worker process starts",
     "the compiler of the FMU failed", "the connection to the Dask scheduler is lost",
     "the effect | of | cannot be imported",
     "the files contain several directions",
