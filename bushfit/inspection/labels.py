@@ -12,10 +12,10 @@ import numpy as np
 from bushfit.caveat import Caveat
 from bushfit.geometry import Place
 from bushfit.reading.headers import ZERO_TO_PEAK, AmplitudeConvention, plain
-from bushfit.reading.layout import UNIT_NAMES
 from bushfit.reading.levels import read_condition
 from bushfit.reading.measurement import Floats
 from bushfit.reading.names import Labels, StatedQuantity, labels_in_names
+from bushfit.reading.roles import UNIT_NAMES
 from bushfit.reading.si_columns import columns_key
 from bushfit.reading.stiffness import hint_for_convertible_columns
 from bushfit.reading.table import Table

@@ -9,7 +9,7 @@ Notes:
 
 import re
 from collections import deque
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import product, takewhile
 from typing import Annotated, Literal
@@ -17,10 +17,11 @@ from typing import Annotated, Literal
 from pydantic import BeforeValidator
 
 from bushfit.caveat import Caveat
+from bushfit.reading.channel_lists import listed_names, scales_above
 from bushfit.reading.headers import WORDS, Vocabulary, plain, split_unit
 from bushfit.reading.lines import MOST_COLUMNS, Content, Line, is_comment, is_row, is_units_row, split
 from bushfit.reading.numerals import is_like_number, plainest_value
-from bushfit.reading.roles import is_test, is_unit_alone, stated_once
+from bushfit.reading.roles import UNIT_NAMES, is_test, is_unit_alone, stated_once
 
 #: Characters that separate columns, by their names in a campaign, in the order in which they are tried.
 DELIMITERS = {"semicolon": ";", "tab": "\t", "pipe": "|", "comma": ",", "caret": "^", "blanks": " "}
@@ -37,11 +38,8 @@ _MOST_HEADINGS = 50
 _LONGEST_HEADER = 10_000
 #: Non-empty lines below a header that are searched for its units row and first numbers; chosen: room for comments.
 _LINES_BELOW_HEADER = 8
-#: Names in the first cells of rows that describe the columns, such as "Unit" and "dx"; and of rows of units among them.
-UNIT_NAMES = frozenset(map(plain, WORDS["rows_of"]["units"]))
+#: Names in the first cells of rows that describe the columns, such as "Unit" and "dx".
 _DESCRIPTIONS = UNIT_NAMES | frozenset(map(plain, WORDS["rows_of"]["descriptions"]))
-#: Names of a column with the size of one count of a channel.
-_SCALES = frozenset(map(plain, WORDS["rows_of"]["scales"]))
 #: Letter, which each name of a column has.
 _LETTER = re.compile(r"[^\W\d_]")
 #: A number with a number sign: "#1".
@@ -50,12 +48,6 @@ _NUMBERED = re.compile(r"#\s?\d+\b")
 _BLANK_BEFORE_BRACKET = re.compile(r" {1,8}(?=[\[(])")
 #: Wide gap, which is shortened to two blanks.
 _WIDE_GAP = re.compile(" {3,}")
-#: Name of a column in a list of names above a table: "Sig1 Time (s)", "Column 2: Weg [mm]", "# 3 Force [N]".
-_LISTED_NAME = re.compile(
-    r"[@#%*\s]*(?:(?:(?:sig|signal|col|column|ch|chan|channel|spalte|kanal)[\s.]*)?(?P<number>\d{1,3})\s*[:=.)\t ]\s*)?"
-    r"(?P<name>[^\W\d].*?)\s*",
-    re.IGNORECASE,
-)
 #: Gap between columns whose headers contain single blanks.
 _COLUMN_GAP = re.compile(r"\t|\s{2,}")
 #: Cell of a line whose columns are separated by wide gaps.
@@ -165,7 +157,7 @@ def find_layout(
     best = max(candidates, key=lambda candidate: candidate[0], default=None)
     if best is None:
         rows = [split(line.content, mark) for line in lines[end : end + 1] for mark in delimiters]
-        if header_line is None and (listed := _listed_names(lines[:end], rows, vocabulary)):
+        if header_line is None and (listed := listed_names(lines[:end], rows, vocabulary)):
             layout = _layout(lines, vocabulary, listed[0], delimiters[listed[1]], listed[2])
             return replace(layout, described_line=lines[end - 1].number)
         return _layout(lines, vocabulary, *_likeliest(lines, before, end, delimiters))
@@ -250,32 +242,6 @@ def _first_rows(lines: Sequence[Line], delimiters: Sequence[str]) -> tuple[int, 
     return len(lines), delimiters
 
 
-def _listed_names(
-    lines: Sequence[Line], rows: Sequence[Sequence[str]], vocabulary: Vocabulary
-) -> tuple[int, int, list[str]] | None:
-    """Find the names of columns that the lines above a table list, one on each line, such as "Channel 1: Time [s]".
-
-    Args:
-        lines: lines above the table.
-        rows: cells of its first row, for each possible delimiter.
-        vocabulary: known column names.
-
-    Returns:
-        Index of the last line of the list, index of the delimiter that gives as many cells as there are names, and the
-        names; None without such a list.
-    """
-    matches = [_LISTED_NAME.fullmatch(line.text) for line in lines]
-    listed = [match for match in matches if match and match["number"]]
-    if not listed:
-        listed = [match for match in matches if match and vocabulary.heading(match["name"])]
-    counts = [int(match["number"]) for match in listed if match["number"]]
-    names = [re.sub(r"\s{2,}|\t", " ", match["name"]) for match in listed]
-    if len(vocabulary.roles(names)) < 2 or counts not in ([], *(list(range(n, n + len(names))) for n in (0, 1))):
-        return None
-    last = matches.index(listed[-1])
-    return next(((last, index, names) for index, row in enumerate(rows) if len(row) == len(names)), None)
-
-
 def _likeliest(
     lines: Sequence[Line], before: Sequence[int], end: int, delimiters: Sequence[str]
 ) -> tuple[int, str, list[str]]:
@@ -350,7 +316,7 @@ def _layout(
             units_line, row = below[0][0], [*cells, *row][: len(headers)]
         elif any(named) and [*map(bool, named)] == [*map(bool, cells)] and not vocabulary.roles(headers[: len(cells)]):
             units_line, headers = below[0][0], [*cells, *headers[len(cells) :]]
-    scaled = _scales_above((split(line.content, delimiter) for line in lines[:index]), headers)
+    scaled = scales_above((split(line.content, delimiter) for line in lines[:index]), headers)
     row = [scaled.get(n, unit) for n, unit in enumerate(row)]
     below = below[len(described) :]
     widths = {len(cells) for _, cells in below if is_row(cells)}
@@ -370,35 +336,28 @@ def _layout(
         _NUMBERED.match(next(filter(None, split(content, delimiter)), "")) for content in contents
     )
     levels = stated_once(headers, (split(content, delimiter) for content in contents), vocabulary)
-    names = ", ".join(f'"{headers[index]}"' for index in sorted(levels))
-    filled = Caveat("cells_filled", f"{names}: an empty cell has the value of the cell above")
-    notes = (filled,)[: bool(levels)]
+    notes: list[Caveat] = []
+    if levels:
+        names = ", ".join(f'"{headers[index]}"' for index in sorted(levels))
+        notes.append(Caveat("cells_filled", f"{names}: an empty cell has the value of the cell above"))
     if scaled:
-        listed = ", ".join(f'"{headers[n]}" {text}' for n, text in scaled.items())
-        notes += (
-            Caveat("stated_unit", f"the lines above the table scale its columns: {listed}; offsets are left out"),
+        scales = ", ".join(f'"{headers[n]}" {text}' for n, text in scaled.items())
+        notes.append(
+            Caveat("stated_unit", f"the lines above the table scale its columns: {scales}; offsets are left out")
         )
     return Layout(
-        delimiter, tuple(headers), number, tuple(row), units_line, (), numbered, False, notes, levels, described_line
+        delimiter,
+        tuple(headers),
+        number,
+        tuple(row),
+        units_line,
+        (),
+        numbered,
+        False,
+        tuple(notes),
+        levels,
+        described_line,
     )
-
-
-def _scales_above(lines: Iterable[Sequence[str]], headers: Sequence[str]) -> dict[int, str]:
-    """Find the scales of recorded counts in a table of channels above the data: "Name,Units,Scale" and a row for each.
-
-    Returns:
-        Scale with its unit, such as "x 0.00125 mm", by index of the header that names the channel.
-    """
-    scale = unit = None
-    scales = dict[int, str]()
-    for cells in lines:
-        names = list(map(plain, cells))
-        if _SCALES.intersection(names) and UNIT_NAMES.intersection(names):
-            scale, unit = (next(n for n, name in enumerate(names) if name in words) for words in (_SCALES, UNIT_NAMES))
-        elif scale is not None and unit is not None and len(cells) > max(scale, unit) and is_like_number(cells[scale]):
-            matching = [n for n, header in enumerate(headers) if header in cells]
-            scales |= dict.fromkeys(matching, f"x {cells[scale]} {cells[unit]}")
-    return scales
 
 
 def _is_labelled_units_row(cells: Sequence[str], width: int) -> bool:

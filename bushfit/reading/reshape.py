@@ -13,11 +13,11 @@ from itertools import islice, zip_longest
 from bushfit import units
 from bushfit.reading.blocks import find_segments
 from bushfit.reading.headers import WORDS, Vocabulary, plain
-from bushfit.reading.layout import UNIT_NAMES, Layout
+from bushfit.reading.layout import Layout
 from bushfit.reading.lines import Line, is_row
 from bushfit.reading.measurement import FEWEST_LOOP_ROWS
 from bushfit.reading.numerals import is_like_number
-from bushfit.reading.roles import is_test
+from bushfit.reading.roles import UNIT_NAMES, is_test
 from bushfit.reading.source import Channels, RowSource, Sheet, cells_of
 
 #: Level of an amplitude in the name of a quantity: "K* 0.1 mm [N/mm]".
