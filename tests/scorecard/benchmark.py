@@ -106,7 +106,7 @@ def ask_bushfit(folder: Path) -> ToolAnswer:
         claims = [[effect["name"]] for effect in effects]
     elif verdict == "ambiguous":
         claims = [[effect["name"], *effect["alternatives"]] for effect in effects] or [
-            [*diagnosed.diagnosis.odds.labels]
+            [" + ".join(names) for names in diagnosed.diagnosis.odds.labels]
         ]
     elif document["next_test"].startswith(MEASURE_AGAIN):
         claims = [[f"fault: {document['next_test'].removeprefix(MEASURE_AGAIN)}"]]
