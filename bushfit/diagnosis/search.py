@@ -28,7 +28,7 @@ from bushfit.diagnosis.projected_columns import GroupSet
 from bushfit.diagnosis.propose import Proposal, has_used_parameters, proposals
 from bushfit.diagnosis.record import DiagnosisSettings
 from bushfit.diagnosis.recorded_tests import RecordedTests, modulus_deviation, record_change
-from bushfit.diagnosis.smooth_deviations import COMPOUND
+from bushfit.diagnosis.smooth_deviations import COMPOUND, POWER_LAW
 from bushfit.diagnosis.verdict import decide_verdict
 from bushfit.effects.mistakes import get_mistake
 from bushfit.errors import FitError, ModelError
@@ -134,6 +134,8 @@ class Search:
             fresh = self._with_common_start([*beam, *fresh])[len(beam) :]
             if depth == 0:
                 fresh += self._corrected_records()
+                if self._is_power_law():
+                    break
             followed = [h for h in self._known.values() if h.unnamed in ("", COMPOUND) and not h.levels]
             limit = max(hypothesis.log_posterior for hypothesis in followed) - LOG_ODDS_CUTOFF
             nearest = sorted(fresh, key=lambda state: -state.log_posterior)
@@ -163,6 +165,15 @@ class Search:
         if finding.verdict == "consistent":
             return finding.nothing >= NAMED and self.root.linear.p_value() >= DOES_NOT_FIT
         return finding.verdict == "named" and finding.reported[0].best.refitted
+
+    def _is_power_law(self) -> bool:
+        """True if a single power law is nearly certain and fits; more would fit the error of its linearisation."""
+        finding = decide_verdict(self._ordered_hypotheses(), self.settings.tolerance)
+        if finding.verdict == "consistent":
+            return False
+        best = finding.reported[0].best
+        is_power_law = best.last is not None and best.last.family == POWER_LAW and len(best.key) == 1
+        return is_power_law and finding.reported[0].probability >= NAMED and best.p_value >= DOES_NOT_FIT
 
     def _settle_linear(self) -> Iterator[Hypothesis]:
         """Yield the most probable hypotheses that need a refit: their evidence is still that of the linear model."""

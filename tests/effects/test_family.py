@@ -180,12 +180,12 @@ def test_sensitivities_match_finite_differences(effect, rng):
     frequency = np.array([5.0, 60.0, 155.0])
     amplitudes = amplitude * np.array([0.91, 1.07, 2.1])
     loop, swept_at = steady_sine(amplitude, 0.1, 512), (direction, frequency, amplitudes)
-    _, swept = stiffness_and_slopes(model, direction, frequency, amplitudes, names, kind="loop", conditions=CONDITIONS)
+    _, swept = stiffness_and_slopes(model, direction, frequency, amplitudes, names, conditions=CONDITIONS)
     _, looped = force_and_slopes(model, direction, loop, names, CONDITIONS)
     worst = 0.0
     for i, key in enumerate(names):
         size = scale(model.parameters[key], model.values[key])
-        stiffness = five_point(model, key, lambda m: m.stiffness(*swept_at, kind="loop", conditions=CONDITIONS))
+        stiffness = five_point(model, key, lambda m: m.stiffness(*swept_at, conditions=CONDITIONS))
         force, wider = (
             five_point(model, key, lambda m: m.force(direction, loop, kind="loop", conditions=CONDITIONS), step)
             for step in (2e-3, 3e-3)

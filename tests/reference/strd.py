@@ -103,6 +103,7 @@ class CurveTerm:
 
     problem: Problem
     noise: float = 1.0
+    compliance_error: float = 0.0
 
     @property
     def size(self) -> int:
