@@ -179,7 +179,7 @@ def _distances(test: NextTest, models: Sequence[Model], place: Place, frequency:
         steel dummy by its compliance, because either is nearly zero and its logarithm has no meaning.
     """
     if test.mounted is None:
-        responses = [np.log(model.stiffness(place, frequency, amplitude)) for model in models]
+        responses = [_log(model.stiffness(place, frequency, amplitude)) for model in models]
     else:
         reference = np.abs(models[0].stiffness(place, frequency, amplitude)).mean()
         measured = []
@@ -189,11 +189,16 @@ def _distances(test: NextTest, models: Sequence[Model], place: Place, frequency:
             fixture = Model.with_defaults(model.bushing, ("elastic", *rig), {**model.values, "mu": modulus})
             measured.append(fixture.stiffness(place, frequency, amplitude) / reference)
         if test.mounted == _SPRING:
-            responses = [np.log(ratio) for ratio in measured]
+            responses = [_log(ratio) for ratio in measured]
         else:
             responses = [1.0 / ratio if test.mounted == _DUMMY else ratio for ratio in measured]
     stacked = np.array(responses)
     return np.sum(np.square(np.abs(stacked[:, None] - stacked)), axis=-1) / _NOISE**2
+
+
+def _log(stiffness: Array) -> Array:
+    """Natural log of a complex stiffness, finite even where a model has no stiffness."""
+    return np.log(stiffness + np.finfo(float).tiny)
 
 
 def _points(test: NextTest, data_sets: Sequence[MeasuredTest]) -> tuple[Array, Array, Place]:
