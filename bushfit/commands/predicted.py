@@ -146,10 +146,10 @@ def prediction_files(output: PredictionOutput, *, wide: bool) -> list[ResultFile
     """
     result, by_place = output.result, by_direction(output.predictions)
     places = [predictions[0].direction for predictions in by_place]
-    names, (fitted, others) = place_names(places), output.measured_by_fit
-    tabled = partial(tables.sweeps_table, result.model, [*fitted, *others])
+    names, (fitted, unfitted) = place_names(places), output.measured_by_fit
+    tabled = partial(tables.sweeps_table, result.model, [*fitted, *unfitted])
     use = ["yes"] * sum(sweep.frequency.size for sweep in fitted)
-    use += ["no"] * sum(sweep.frequency.size for sweep in others)
+    use += ["no"] * sum(sweep.frequency.size for sweep in unfitted)
     measured = ResultFile("measured", "table", lambda: tabled().assign(fitted=use))
 
     def draw(prediction: Prediction) -> Figure:

@@ -266,12 +266,11 @@ def _levels(fit: FitResult, sweeps: Sequence[MeasuredSweep]) -> Iterator[FaultyP
             label = add_preload(_level_label(sweep, int(np.argmax(mask))), sweep.test.preload, sweep.direction)
             if levels.size > 1:  # in this file or in others
                 part = _common_fault(fit, "level", label, [sweep], [mask])
-                others = [member for member in members if member is not sweep]
-                at = [
-                    preloads[test] for test in others if np.abs(np.log(test.held_value / level)).min() < np.log(_SAME)
-                ]
-                is_largest = level == levels.max() and all(preload > other for other in at)
-                is_smallest = level == levels.min() and all(preload < other for other in at)
+                rivals = [member for member in members if member is not sweep]
+                distances = [np.abs(np.log(rival.held_value / level)).min() for rival in rivals]
+                loads = [preloads[r] for r, d in zip(rivals, distances, strict=True) if d < np.log(_SAME)]
+                is_largest = level == levels.max() and all(preload > load for load in loads)
+                is_smallest = level == levels.min() and all(preload < load for load in loads)
                 yield replace(part, may_be_physics=levels.size > 2 and (is_largest or is_smallest))
             numbers = np.unique(sweep.repeat[mask])
             for repeat in numbers if numbers.size > 2 else ():

@@ -224,8 +224,8 @@ def power_laws(fit: FitResult) -> list[Explanation]:
     scopes = {str(name): (directions == name).astype(complex) for name in np.unique(directions)}
     if len(scopes) > 1:
         first = tests[0].direction.motion  # stiffness has one unit among tests with the same kind of motion
-        alike = np.concatenate([np.full(test.frequency.size, test.direction.motion is first) for test in tests])
-        scopes |= {name: stiffness**power * (alike | (power == 0)) for name, power in _COMMON_CHANGES.items()}
+        same_unit = np.concatenate([np.full(test.frequency.size, test.direction.motion is first) for test in tests])
+        scopes |= {name: stiffness**power * (same_unit | (power == 0)) for name, power in _COMMON_CHANGES.items()}
     powers = list(product(_POWERS, repeat=2))
     laws = np.exp(np.array(powers) @ (points - points.mean(axis=0)).T)
     for scope, change in scopes.items():

@@ -220,6 +220,9 @@ def plain_text(text: str) -> str:
     Letters and digits of full or half width become plain ones, and HTML entities the characters they stand for; UTF-8
     that was read as cp1252 ("Âµ") is repaired, and quotation marks that keep a program from reading a cell or a whole
     line, as in ="0.1", are dropped.
+
+    Returns:
+        The text, with as many lines.
     """
     if '"' in text:
         text = _QUOTED_CELL.sub(r'"\1"', text)

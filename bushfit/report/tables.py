@@ -287,7 +287,11 @@ def sweeps_table(model: Model, data_sets: Sequence[MeasuredSweep]) -> pd.DataFra
 
 
 def condition_columns(conditions: RubberConditions, place: Place) -> dict[str, Any]:
-    """Columns of temperature and preload of a test or prediction, if they are known, by their headers."""
+    """Columns of temperature and preload of a test or prediction.
+
+    Returns:
+        Temperature [degC] and preload in the unit of the place, by column header; without those that are unknown.
+    """
     columns = dict[str, Any]()
     if conditions.temperature is not None:
         columns["temperature [degC]"] = conditions.temperature - CELSIUS

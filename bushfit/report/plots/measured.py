@@ -134,6 +134,9 @@ def rows_at_conditions(table: pd.DataFrame, prediction: Prediction) -> pd.DataFr
     """Select the measured sweeps to draw with a prediction: of the same direction, preload and temperature.
 
     The table may lack preload and temperature. The temperature is ignored if the model does not depend on it.
+
+    Returns:
+        The selected rows, with the name of the sweep in the column "test".
     """
     rows = table[table["direction"] == str(prediction.direction)].rename(columns={"sweep": "test"})
     preload, kelvin = prediction.conditions.preload, prediction.conditions.temperature
