@@ -41,7 +41,7 @@ def describe_sampling(record: Loop) -> str:
     if not record.has_recorded_time:
         return "no time in the file"
     steps = np.diff(record.time)
-    usual = float(np.median(steps))
+    usual = record.time_step
     if np.ptp(steps) < EVEN_CLOCK * usual:
         return f"even, every {usual:.4g} s"
     return f"uneven, every {steps.min():.3g} to {steps.max():.3g} s, mostly {usual:.3g} s"
@@ -79,7 +79,7 @@ def odd_recording(
     Returns:
         One warning for each oddity.
     """
-    place, sampling_rate = record.direction, 1.0 / float(np.median(np.diff(record.time)))
+    place, sampling_rate = record.direction, 1.0 / record.time_step
     names, units = place.motion.words, place.display
     motion = RecordedChannel(names[0], *units.displacement, record.displacement)
     force = RecordedChannel(names[1], *units.force, record.force)

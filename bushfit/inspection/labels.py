@@ -13,7 +13,6 @@ from bushfit.caveat import Caveat
 from bushfit.geometry import Place
 from bushfit.reading.headers import ZERO_TO_PEAK, AmplitudeConvention, plain
 from bushfit.reading.levels import read_condition
-from bushfit.reading.measurement import Floats
 from bushfit.reading.names import Labels, StatedQuantity, labels_in_names
 from bushfit.reading.roles import UNIT_NAMES
 from bushfit.reading.si_columns import columns_key
@@ -204,12 +203,12 @@ def wrong_labels(
         yield Caveat("wrong_label", sentence)
 
 
-def contradicting_lines(table: Table, time: Floats | None) -> Iterator[Caveat]:
-    """Warn where a line above the table states another unit than a header, or another rate than the recorded time.
+def contradicting_lines(table: Table, time_step: float | None) -> Iterator[Caveat]:
+    """Warn where a line above the table states another unit than a header, or another rate than the record has.
 
     Args:
         table: table of the test.
-        time: recorded time [s], (n,); None for a sweep, or if the file has no time.
+        time_step: recorded time from row to row [s]; None for a sweep, or if the file has no time.
 
     Yields:
         A warning for each contradiction.
@@ -225,7 +224,7 @@ def contradicting_lines(table: Table, time: Floats | None) -> Iterator[Caveat]:
                 sentence = f'line {line.number} states "{line.text}", the unit of "{column.header}" is {unit}'
                 yield Caveat("wrong_label", sentence)
     rate = sampling_rate_above(table)[0]
-    recorded = 0.0 if time is None else 1.0 / float(np.median(np.diff(time)))
-    if rate and recorded and abs(rate / recorded - 1.0) > _AGREEMENT:
+    if rate and time_step and abs(rate * time_step - 1.0) > _AGREEMENT:
+        recorded = 1.0 / time_step
         sentence = f"the text above the table states {rate:.4g} rows a second, the recorded time {recorded:.4g}"
         yield Caveat("wrong_label", sentence)

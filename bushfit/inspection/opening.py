@@ -85,8 +85,8 @@ def inspect_file(file: Path, test_options: Mapping[str, Any], of_book: Labels = 
                 sentence = f"the preload {stated} that the text states is not in the record: {preload}"
                 odd.append(Caveat("wrong_preload", sentence))
             entry.setdefault("preload", preload)
-    time = measured.time if isinstance(measured, Loop) and measured.has_recorded_time else None
-    odd += contradicting_lines(table, time)
+    time_step = measured.time_step if isinstance(measured, Loop) and measured.has_recorded_time else None
+    odd += contradicting_lines(table, time_step)
     contents = describe_format(table), describe_columns(table, is_sweep=is_sweep), facts | label_facts, tuple(odd)
     is_uncounted = is_sweep and not counted and "amplitude" not in entry
     return Inspection(file, kind, place, *contents, entry, measured, amplitude_convention_unknown=is_uncounted)

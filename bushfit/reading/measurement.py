@@ -102,6 +102,11 @@ class Loop:
     def __post_init__(self) -> None:
         _check_lengths(self.name, self.time, self.displacement, self.force)
 
+    @property
+    def time_step(self) -> float:
+        """Time from row to row [s]: the median, which missing rows do not change."""
+        return float(np.median(np.diff(self.time)))
+
     def select(self, rows: slice | NDArray[np.bool_]) -> Loop:
         """Return the loop with only some of its n rows, given by a slice or a mask, (n,)."""
         return replace(self, **{name: getattr(self, name)[rows] for name in ("time", "displacement", "force")})
