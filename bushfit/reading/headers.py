@@ -306,8 +306,8 @@ def fits(word: str, role: str, unit: str | None) -> bool:
     """
     if unit == "" and (role in ROLE_SETS["needing_units"] or word == "k"):
         return False
-    if word == "t" and role == "temperature" and unit is not None:
-        return bool(units.kelvin_scale(unit))  # else a time, or another quantity
+    if word == "t" and role in ("time", "temperature") and unit is not None:
+        return bool(units.kelvin_scale(unit)) == (role == "temperature")
     if unit and (expected := _UNITS_OF.get((word, role))):
         return any(units.is_compatible(unit, si) for si in expected)
     excluded = (*_UNITS_NOT_F.get((word, role), ()), *_UNITS_NOT.get(role, ()))

@@ -93,7 +93,11 @@ def add_by_unit(table: Table, roles: dict[str, Column]) -> tuple[list[Caveat], l
             column
             for column, words in free.items()
             if (words & _QUALIFIERS[qualifier] if qualifier else role not in LOOP_COLUMNS or not words & amplitude)
-            and any(units.is_compatible(column.unit or "", si) for si in expected)
+            and (
+                units.kelvin_scale(column.unit or "")
+                if role == "temperature"
+                else any(units.is_compatible(column.unit or "", si) for si in expected)
+            )
             and is_like_number(str(table.first_row[column.index]))
         ]
         if len(fitting) == 1:
