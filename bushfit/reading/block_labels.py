@@ -74,7 +74,7 @@ def find_remarks(table: Table) -> tuple[Caveat, ...]:
         table: table of the file.
 
     Returns:
-        Warnings on lines above the table, marked rows and hidden rows.
+        Warnings on lines above the table, marked rows, hidden rows and cells that a number format divides.
     """
     remarks = ((line.number, line.text[:_LONGEST_QUOTE]) for line in table.lines_above if is_remark(line.text))
     warnings = [Caveat("remark", f'line {number} is not understood: "{text}"') for number, text in remarks]
@@ -88,6 +88,11 @@ def find_remarks(table: Table) -> tuple[Caveat, ...]:
     if hidden := [number for number in table.source.hidden if number > table.layout.header_line]:
         sentence = f"{len(hidden)} rows from row {hidden[0]} on are hidden in the workbook, but are read"
         warnings.append(Caveat("hidden_rows", sentence))
+    if table.source.divided:
+        sentence = (
+            f"{table.source.divided} cells are shown divided by 1000 by their number format: the shown numbers are read"
+        )
+        warnings.append(Caveat("divided_cells", sentence))
     return tuple(warnings)
 
 

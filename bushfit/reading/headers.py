@@ -67,7 +67,7 @@ Meant = TypeVar("Meant")
 #: Channel of a test rig in brackets: "Load(Linear:Load) (kN)".
 _CHANNEL = re.compile(r"\((?:[^()]|\([^()]*\))*[:|](?:[^()]|\([^()]*\))*\)")
 #: Loss factor written as a function, with brackets that do not contain a unit.
-_TAN = re.compile(r"(?i)\btan\s*\(\s*(delta|d|δ)\s*\)")
+_TAN = re.compile(r"(?i)\bt(?:an|g)\s*\(\s*(delta|d|δ|φ)\s*\)")
 #: Logarithm of a quantity: "log10 f [Hz]", "lg(G') [Pa]", "log10(K*/(N/m))". The base of a plain log is not known.
 _LOGARITHM = re.compile(
     r"(?i)\s*(?P<kind>log[\s_]?10|lg|ln|log)(?=[\s_(])[\s_]*(?:\((?P<inner>(?:[^()]|\([^()]*\))*)\))?"
@@ -246,7 +246,7 @@ class Vocabulary:
             is_extreme = extreme is not None and is_first
             if unit is None and name.endswith(("%", "‰", "°")):
                 continue  # the unit without a bracket
-            bare, without_asides = plain(name), plain(_ASIDES.sub("", _folded(name)))
+            bare, without_asides = plain(name), plain(_ASIDES.sub("", folded(name)))
             implied: AmplitudeConvention | None = "peak-to-peak" if bare in PEAK_TO_PEAK_NAMES else convention
             amplitudes = [word + "amplitude" for word in (bare, without_asides) if implied or (extreme and word)]
             amplitudes += ["amplitude"] * (bare in PEAK_TO_PEAK_NAMES) + [f"{bare}extreme"] * is_extreme
@@ -279,7 +279,7 @@ class Vocabulary:
             word, symbol = plain(name[: blank.start()]), plain(name[blank.end() :])
             if word in self._roles and set(self._roles[word]) & set(self._roles.get(symbol, ())):
                 yield word
-            elif _SYMBOL.fullmatch(symbol) and _UNLIKE_SYMBOL.isdisjoint(_folded(name).split()):
+            elif _SYMBOL.fullmatch(symbol) and _UNLIKE_SYMBOL.isdisjoint(folded(name).split()):
                 yield from [symbol] * any(units.is_compatible(unit or "", si) for si in ("N/m", "N*m/rad", "Pa"))
 
 
@@ -330,7 +330,7 @@ def _split_off(text: str, patterns: Sequence[tuple[re.Pattern[str], Meant]]) -> 
     """Split a text into the part that matches no pattern, and the meaning of the first matching pattern, or None."""
     for form in dict.fromkeys((text, _CAMEL.sub(" ", text))):
         for pattern, meaning in patterns:
-            if match := pattern.search(_folded(form)):
+            if match := pattern.search(folded(form)):
                 rest = form[: match.start()] + " " + form[match.end() :]
                 return _EMPTY_BRACKETS.sub("", _DANGLING.sub("", rest)).strip(), meaning
     return text.strip(), None
@@ -352,13 +352,13 @@ def parse_unit(text: str) -> tuple[str, AmplitudeConvention | None, float]:
 @lru_cache(maxsize=1 << 15)  # the vocabularies have five thousand names
 def plain(name: str) -> str:
     """Normalise a name for comparison: only letters, digits and ' | *, in lower case without accents."""
-    letters = re.sub(r"[^\w'|*]|_", "", _folded(name.translate(_FOOTNOTES).translate(_SPELLINGS)).replace("ß", "ss"))
+    letters = re.sub(r"[^\w'|*]|_", "", folded(name.translate(_FOOTNOTES).translate(_SPELLINGS)).replace("ß", "ss"))
     return letters.replace("ae", "a").replace("oe", "o").replace("ue", "u")
 
 
 def without_mean(name: str) -> str:
     """Name in plain letters (see `plain`) without a word for the mean of several parts or repeats."""
-    return plain(_MEANS.sub("", _folded(name)))
+    return plain(_MEANS.sub("", folded(name)))
 
 
 def plain_name(header: str) -> str:
@@ -393,7 +393,7 @@ def _splits(text: str) -> Iterator[tuple[str, str | None, bool]]:
 
 
 @lru_cache(maxsize=4096)
-def _folded(text: str) -> str:
+def folded(text: str) -> str:
     """Text in lower case without accents, with the same number of characters; syllables of Hangul stay whole."""
     return "".join(
         letter if "가" <= letter <= "힣" else unicodedata.normalize("NFKD", letter)[0] for letter in text.lower()

@@ -20,6 +20,7 @@ from bushfit.reading.headers import (
     WORDS,
     AmplitudeConvention,
     Vocabulary,
+    folded,
     plain,
     split_convention,
 )
@@ -105,8 +106,8 @@ _WORD_STARTS = {start: Direction(name) for name, starts in WORDS["direction"].it
 #: Direction by its abbreviation in names; in headers rad is a unit.
 _SHORT = {"ax": Direction.AXIAL, "rad": Direction.RADIAL, "tors": Direction.TORSION, "tor": Direction.TORSION}
 _LETTERS = re.compile(r"[^\W\d_]+")
-#: Starts of words in remarks that may change what a test means.
-_REMARKS = tuple(WORDS["remarks"]["starts"])
+#: Starts of words, and phrases, in remarks that may change what a test means.
+_REMARKS, _REMARK_PHRASES = tuple(WORDS["remarks"]["starts"]), re.compile("|".join(WORDS["remarks"]["phrases"]))
 #: Word that is not a unit after a number.
 _WORD = re.compile(r"(?<![a-z\d.,])(?:[a-z]+)")
 
@@ -259,7 +260,8 @@ def _convention_in_line(line: Line) -> AmplitudeConvention | None:
 
 def is_remark(text: str) -> bool:
     """True if a text may change the meaning of a test but fits no key of a campaign, such as "2 in parallel"."""
-    return any(plain(word).startswith(_REMARKS) for word in _LETTERS.findall(text))
+    starts = any(plain(word).startswith(_REMARKS) for word in _LETTERS.findall(text))
+    return starts or _REMARK_PHRASES.search(folded(text)) is not None
 
 
 def _name_and_values(line: Line) -> list[str]:
@@ -336,10 +338,10 @@ def named_direction(texts: Iterable[str], *, short: bool = False) -> Direction |
 
     With `short`, the abbreviations "ax", "rad" and "tors" are recognised too, as in file names.
     """
-    folded = unicodedata.normalize("NFKD", " ".join(texts)).encode("ascii", "ignore").decode().casefold()
-    directions = {direction for start, direction in _WORD_STARTS.items() if re.search(rf"(?<![a-z]){start}", folded)}
+    text = folded(" ".join(texts))
+    directions = {direction for start, direction in _WORD_STARTS.items() if re.search(rf"(?<![a-z]){start}", text)}
     if short and not directions:
-        directions = {_SHORT[word] for word in _WORD.findall(folded) if word in _SHORT}
+        directions = {_SHORT[word] for word in _WORD.findall(text) if word in _SHORT}
     return directions.pop() if len(directions) == 1 else None
 
 

@@ -48,6 +48,7 @@ class Text:
     layout: None = None
     numeric: frozenset[int] = frozenset()
     hidden: tuple[int, ...] = ()
+    divided: int = 0
 
     @cached_property
     def head(self) -> list[Line]:
@@ -164,6 +165,7 @@ class Sheet:
         above: lines above the table, such as those above the first block, or properties of a recording.
         numbers: line number in the file of each row, if the rows were rearranged below the header; None for a sheet.
         hidden: numbers of the rows that the workbook hides.
+        divided: number of cells that a number format shows divided by a power of 1000, as they are read.
         is_visible: False for a hidden sheet of a workbook.
     """
 
@@ -176,6 +178,7 @@ class Sheet:
     above: Sequence[Line] = ()
     numbers: Sequence[int] | None = None
     hidden: Sequence[int] = ()
+    divided: int = 0
     is_visible: bool = True
 
     def may_contain(self, _sign: str, _layout: Layout) -> bool:

@@ -3,13 +3,14 @@
 import io
 import re
 import zipfile
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from xml.etree import ElementTree
 
 from bushfit.errors import MeasurementError
 from bushfit.reading.files import plain_text
 from bushfit.reading.source import Sheet
+from bushfit.units import is_unit
 
 #: Largest number of cells in all sheets, including empty ones between others; chosen: a full sheet of ten columns.
 _MOST_CELLS = 10_500_000
@@ -24,9 +25,11 @@ _NOT_COMPUTED = re.compile(
 #: Row of a sheet of an xlsx workbook that is hidden, by a user or a filter.
 _HIDDEN_ROW = re.compile(rb'<(?:\w+:)?row (?=[^>]*\bhidden="(?:1|true)")[^>]*\br="(\d+)"')
 #: Cell of a sheet of an xlsx workbook with one of several styles.
-_STYLED_CELL = r'<(?:\w+:)?c (?=[^>]*\bs="(?:{styles})")[^>]*\br="([A-Z]+)(\d+)"'
-#: Numbers of the formats for percentages that all workbooks have.
-_PERCENTAGES = ("9", "10")
+_STYLED_CELL = r'<(?:\w+:)?c (?=[^>]*\bs="({styles})")[^>]*\br="([A-Z]+)(\d+)"'
+#: Formats for percentages that all workbooks have, by their number.
+_PERCENTAGES = {"9": "0%", "10": "0.00%"}
+#: End of a number format that scales a number or shows a unit: "0.0%", "#,##0.0,", '0.0" kN/mm"'.
+_FORMAT_END = re.compile(r'[0#?](?P<thousands>,*)(?:\s*(?P<percent>%)|\s*"\s*(?P<unit>[^"]+?)\s*")?\s*(?:;|$)')
 
 
 def workbook(data: bytes, _: Path) -> Iterator[Sheet]:
@@ -40,7 +43,7 @@ def workbook(data: bytes, _: Path) -> Iterator[Sheet]:
     """
     import python_calamine as calamine
 
-    contents, percent_styles = _xml_of_sheets(data)
+    contents, shown = _xml_of_sheets(data)
     book = calamine.load_workbook(io.BytesIO(data))
     visible_names = {sheet.name for sheet in book.sheets_metadata if sheet.visible == calamine.SheetVisibleEnum.Visible}
     cells_left = _MOST_CELLS
@@ -50,14 +53,17 @@ def workbook(data: bytes, _: Path) -> Iterator[Sheet]:
         if cells_left < 0:
             raise _too_large(f'more, with sheet "{name}"')
         rows = [_row(row) for row in sheet.to_python(skip_empty_area=False)]
-        for row, column in _cells_with(percent_styles, xml):
+        divided = 0
+        for row, column, (factor, unit) in _cells_with(shown, xml):
             if row < len(rows) and column < len(rows[row]) and isinstance(value := rows[row][column], float):
-                rows[row][column] = f"{100.0 * value:.12g}%"
+                rows[row][column] = f"{factor * value:.12g}{unit}"
+                divided += factor < 1.0
         yield Sheet(
             name,
             rows,
             lacks_values=lambda: any(map(_NOT_COMPUTED.search, contents.values())),
             hidden=tuple(map(int, _HIDDEN_ROW.findall(xml))),
+            divided=divided,
             is_visible=name in visible_names or not visible_names,
         )
 
@@ -68,18 +74,18 @@ def _too_large(found: str) -> MeasurementError:
     return MeasurementError("the workbook is too large", found=found, expected=expected, hint="save the sheet as CSV")
 
 
-def _xml_of_sheets(data: bytes) -> tuple[dict[str, bytes], list[str]]:
+def _xml_of_sheets(data: bytes) -> tuple[dict[str, bytes], dict[str, tuple[float, str]]]:
     """Read the parts of an xlsx workbook that the library for workbooks does not evaluate.
 
     Returns:
-        XML of each sheet by its name, and the numbers of the cell styles that show percentages; both are empty for
-        other formats.
+        XML of each sheet by its name, and the factor and unit with which cells show their number (see `_shown`) by
+        the number of their style, for styles that change it; both are empty for other formats.
 
     Raises:
         MeasurementError: sheets are too large, or have a very distant cell (the reader allocates all cells up to it).
     """
     if not data.startswith(b"PK"):
-        return {}, []
+        return {}, {}
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         parts = [part for part in archive.infolist() if re.search(r"sheet[^/]*\.xml$", part.filename)]
         size = sum(part.file_size for part in parts)
@@ -101,18 +107,29 @@ def _xml_of_sheets(data: bytes) -> tuple[dict[str, bytes], list[str]]:
         for sheet in book
         if sheet.tag.endswith("}sheet")
     }
-    formats = {one.get("numFmtId"): str(one.get("formatCode")) for one in styles if one.tag.endswith("}numFmt")}
+    own = {one.get("numFmtId", ""): str(one.get("formatCode")) for one in styles if one.tag.endswith("}numFmt")}
     cell_styles = next((list(one) for one in styles if one.tag.endswith("}cellXfs")), [])
-    numbers = [style.get("numFmtId", "") for style in cell_styles]
-    percent_styles = [str(n) for n, one in enumerate(numbers) if one in _PERCENTAGES or "%" in formats.get(one, "")]
-    return {name: contents.get(f"xl/{target}", b"") for name, target in sheets.items()}, percent_styles
+    formats = [{**_PERCENTAGES, **own}.get(style.get("numFmtId", ""), "") for style in cell_styles]
+    shown = {str(style): meaning for style, code in enumerate(formats) if (meaning := _shown(code)) != (1.0, "")}
+    return {name: contents.get(f"xl/{target}", b"") for name, target in sheets.items()}, shown
 
 
-def _cells_with(styles: Collection[str], xml: bytes) -> Iterator[tuple[int, int]]:
-    """Yield row and column index of each cell of a sheet with one of these styles."""
+def _shown(code: str) -> tuple[float, str]:
+    """Factor and unit with which a number format, such as "0.0%", shows a number; 1 and "" if it shows neither."""
+    if (match := _FORMAT_END.search(code)) is None:
+        return 1.0, ""
+    if match["percent"]:
+        return 100.0, "%"
+    unit = match["unit"] or ""
+    is_known = not unit or is_unit(unit)  # else a text such as "k" for thousands
+    return (1e-3 ** len(match["thousands"]), f" {unit}".rstrip()) if is_known else (1.0, "")
+
+
+def _cells_with(styles: Mapping[str, tuple[float, str]], xml: bytes) -> Iterator[tuple[int, int, tuple[float, str]]]:
+    """Yield row and column index of each cell of a sheet with one of these styles, and factor and unit of its style."""
     pattern = _STYLED_CELL.format(styles="|".join(styles)).encode()
-    for letters, number in re.findall(pattern, xml) if styles else ():
-        yield int(number) - 1, _column_index(letters.decode())
+    for style, letters, number in re.findall(pattern, xml) if styles else ():
+        yield int(number) - 1, _column_index(letters.decode()), styles[style.decode()]
 
 
 def _column_index(letters: str) -> int:

@@ -133,6 +133,32 @@ def test_parts_side_by_side_and_date_cells_of_a_workbook(tmp_path):
         check(test, {**LOOP, "force": factor * FORCE})
 
 
+@pytest.mark.parametrize(
+    ("header", "form", "factor", "words"),
+    [
+        ("force [kN]", "#,##0.000,", 1.0, ["2 cells are shown divided by 1000"]),
+        ("force", '0.0" kN";-0.0" kN"', 1e-3, []),
+        ("force [N]", '#,##0.0,"k"', 1.0, []),
+    ],
+)
+def test_numbers_of_a_workbook_are_read_as_it_shows_them(header, form, factor, words, tmp_path):
+    book = openpyxl.Workbook()
+    for row in (
+        ["time [s]", "displacement [mm]", header],
+        *zip(TIME.tolist(), DISPLACEMENT, factor * FORCE, strict=True),
+    ):
+        book.active.append(row)
+    for row in (2, 3) if words else range(2, TIME.size + 2):
+        book.active.cell(row, 3).number_format = form
+    if words:
+        for row in range(4, TIME.size + 2):
+            book.active.cell(row, 3).value /= 1e3
+    book.save(tmp_path / "loop.xlsx")
+    document, (test,) = inspected(tmp_path, "loop.xlsx")
+    assert [word for word in words if word not in " | ".join(document["files"][0]["odd"])] == []
+    check(test, LOOP)
+
+
 def test_hidden_rows_of_a_workbook_are_read_and_reported(tmp_path):
     book = openpyxl.Workbook()
     for row in ["time [s]", "displacement [mm]", "force [N]"], *zip(TIME.tolist(), DISPLACEMENT, FORCE, strict=True):
