@@ -102,8 +102,9 @@ def test_any_name_and_any_line_say_something_that_can_be_read(text):
 def test_remarks_that_may_change_the_meaning_of_a_test():
     remarks = [
         "2 Stück parallel geprüft", "Werte gelten für 2 Lager", "Stiffness of two mounts", "Tested back to back",
-        "per coppia di supporti", "Bushings per test: 2", "2 bushings in series", "In Reihe: 2 Lager", "Amplitude is double",
-        "Zwei Prüflinge gegenüberliegend", "Force divided by 2", "Mean of 3 parts", "All values x 0.5", "Steifigkeit je Paar",
+        "per coppia di supporti", "Bushings per test: 2", "2 bushings in series", "In Reihe: 2 Lager",
+        "Amplitude is double", "Zwei Prüflinge gegenüberliegend", "Force divided by 2", "Mean of 3 parts",
+        "All values x 0.5", "Steifigkeit je Paar",
     ]  # fmt: skip
     others = ["Specimens: 2", "Test series: 12", "Versuchsreihe 5", "Lager 2", "Two Rivers", "Amplitude: 2 mm", "n = 2"]
     assert [text for text in (*remarks, *others) if is_remark(text)] == remarks
