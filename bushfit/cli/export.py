@@ -84,8 +84,8 @@ def command(model: Path, formats: tuple[str, ...], campaign: Path | None, output
     from bushfit.campaign.campaign import load_campaign
     from bushfit.commands.export import export
     from bushfit.commands.loading import load_model, model_file, model_source
-    from bushfit.commands.predict import GridOptions
     from bushfit.commands.provenance import input_files
+    from bushfit.prediction.grid import GridOptions
 
     result, loaded = load_model(model), load_campaign(campaign) if campaign else None
     dialect = settings.pop("dialect")

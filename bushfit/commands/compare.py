@@ -11,7 +11,7 @@ from bushfit.caveat import Caveat
 from bushfit.commands.families import COMPOUND, family_to_use, fit_campaign_families
 from bushfit.commands.fit import fit
 from bushfit.commands.loading import HasResult, as_result
-from bushfit.commands.predict import GridOptions, requested_preloads, requested_settings
+from bushfit.commands.predict import requested_preloads
 from bushfit.commands.predicted import table_columns
 from bushfit.diagnosis.families import FittedFamily
 from bushfit.errors import BushfitError, ModelError
@@ -22,7 +22,7 @@ from bushfit.model.result import Result
 from bushfit.prediction.caveats import warnings_of
 from bushfit.prediction.comparison import Comparison, with_holm
 from bushfit.prediction.comparison import compare as compare_two
-from bushfit.prediction.grid import common_grid, requested_grid
+from bushfit.prediction.grid import GridOptions, common_grid, grid_settings, requested_grid
 from bushfit.reading.measurement import Sweep
 from bushfit.report import plots
 from bushfit.report.compare_document import (
@@ -120,7 +120,7 @@ def compare(
     Raises:
         BushfitError: too few or too many results, or directions and points that one of them cannot predict.
     """
-    settings, directions = requested_settings(grid), grid.get("directions") or ()
+    settings, directions = grid_settings(grid), grid.get("directions") or ()
     fitted, notes = list[FittedFamily](), list[Caveat]()
     if families is not None and isinstance(reference, Campaign) and not others:
         fitted, results, notes = fit_campaign_families(reference, families, directions or None)

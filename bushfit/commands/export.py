@@ -11,9 +11,10 @@ from typing_extensions import TypedDict
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.caveat import WarningEntries, to_entries
-from bushfit.commands.predict import GridOptions, predict
+from bushfit.commands.predict import predict
 from bushfit.export.contract import Exported, ExportRequest
 from bushfit.model.result import Result
+from bushfit.prediction.grid import GridOptions
 from bushfit.progress import track
 from bushfit.reading.measurement import Source
 from bushfit.report.results import ResultFile

@@ -11,7 +11,6 @@ import pandas as pd
 from bushfit.campaign.campaign import Campaign, model_of
 from bushfit.campaign.schema import RigSettings
 from bushfit.commands.fit import prepare_tests
-from bushfit.commands.predict import GridOptions, requested_settings
 from bushfit.effects.contract import Array
 from bushfit.errors import ModelError, unknown_name
 from bushfit.geometry import default_places, get_places
@@ -22,7 +21,7 @@ from bushfit.planning.contract import Aim, Knowledge, PlanRequest, Test, operati
 from bushfit.planning.knowledge import from_campaign, from_result, with_rig_class
 from bushfit.planning.plan import Plan
 from bushfit.planning.plan import plan as choose_tests
-from bushfit.prediction.grid import default_grid, grid_settings, requested_grid
+from bushfit.prediction.grid import GridOptions, default_grid, grid_settings, requested_grid
 from bushfit.report.results import ResultFile
 from bushfit.units import number
 
@@ -79,7 +78,7 @@ def plan(
     specimens = knowledge.result.specimens
     default = default_places(knowledge.model.bushing, () if knowledge.model.bushing else specimens)
     places = tuple(place for name in test_directions for place in get_places(name, specimens)) or tuple(default)
-    settings, sweeps = grid_settings(requested_settings(grid), campaign), campaign.sweeps if campaign else ()
+    settings, sweeps = grid_settings(grid, campaign), campaign.sweeps if campaign else ()
     wanted_places = [place for name in settings.directions or () for place in get_places(name, specimens)]
     start = Result(knowledge.model, specimens=specimens)
     grids = {

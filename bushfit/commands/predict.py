@@ -1,19 +1,18 @@
 """predict: stiffness and loss factor of a fitted model over frequency and amplitude."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any, TypedDict, Unpack
+from typing import Unpack
 
 import numpy as np
 
 from bushfit.campaign.campaign import Campaign
-from bushfit.campaign.schema import PredictSettings
 from bushfit.campaign.session import measured_session
 from bushfit.caveat import Caveat
 from bushfit.commands.loading import HasResult, as_result
 from bushfit.commands.predicted import PredictionOutput, prediction_files
 from bushfit.effects import Level
-from bushfit.effects.contract import Array, RubberConditions
+from bushfit.effects.contract import RubberConditions
 from bushfit.effects.temperature import REFERENCE
 from bushfit.errors import ModelError, UnitError
 from bushfit.fitting.preparation import MeasuredSweep, prepare_sweeps
@@ -21,38 +20,19 @@ from bushfit.geometry import Bushing, Direction, Place, Specimen, default_places
 from bushfit.model.arms import Arms, model_arms
 from bushfit.model.result import Result
 from bushfit.model.transfer import transfer_compound
-from bushfit.prediction.grid import default_grid, grid_settings, requested_grid, static_reach
+from bushfit.prediction.conditions import tested_preload
+from bushfit.prediction.grid import GridOptions, default_grid, grid_settings, requested_grid, static_reach
 from bushfit.prediction.resonance import PredictedResonance, predict_resonance
 from bushfit.prediction.static_curve import StaticCurve, static_curve, static_rate
-from bushfit.prediction.stiffness import Prediction, tested_preload
+from bushfit.prediction.stiffness import Prediction
 from bushfit.prediction.stiffness import predict as predict_stiffness
 from bushfit.prediction.superposed import LargeMotion
 from bushfit.reading.measurement import SAME_TEMPERATURE, Loop, Sweep
 from bushfit.reading.preload import Preload, parse_preload
 from bushfit.units import CELSIUS
 
-#: Frequencies, amplitudes or other numbers of a grid.
-Numbers = Sequence[float] | Array
 #: Directions that are predicted by default: those of the paper.
 _DIRECTIONS = (Direction.AXIAL, Direction.RADIAL)
-
-
-class GridOptions(TypedDict, total=False):
-    """Directions and operating points of a prediction; a missing key, or None, selects the default.
-
-    Args:
-        directions: directions or specimens by name.
-        frequencies: frequencies [Hz].
-        amplitudes: zero-to-peak displacements [m].
-        torsion_amplitudes: zero-to-peak rotations [rad].
-        strain_amplitudes: zero-to-peak strains of specimens that give a modulus.
-    """
-
-    directions: Sequence[str] | None
-    frequencies: Numbers | None
-    amplitudes: Numbers | None
-    torsion_amplitudes: Numbers | None
-    strain_amplitudes: Numbers | None
 
 
 def predict(
@@ -118,7 +98,7 @@ def predict(
         raise ModelError(problem, found=", ".join(preloads), expected="one, or none")
     if preloads and not directions and result.measured:
         directions = [tested.place for tested in result.measured.preloads] or None
-    settings = grid_settings(requested_settings({**grid, "directions": directions}), campaign)
+    settings = grid_settings({**grid, "directions": directions}, campaign)
     specimens = {specimen.name: specimen for specimen in (*result.specimens, *(campaign.specimens if campaign else ()))}
     places = [place for name in settings.directions or () for place in get_places(name, [*specimens.values()])]
     places = places or default_places(result.model.bushing, [*specimens.values()])
@@ -230,16 +210,6 @@ def requested_preloads(result: Result, place: Place, preloads: Sequence[str]) ->
         found, expected = f'"{preloads[parsed.index(None)]}"', 'such as "500 N", "1.5 mm" or "none"'
         raise UnitError(f"not a preload of the {place} direction", place="preload", found=found, expected=expected)
     return [tested_preload(result, place, preload) for preload in parsed]
-
-
-def requested_settings(grid: GridOptions) -> PredictSettings:
-    """Convert the grid options of a prediction to settings, with None for directions or axes that use the default."""
-    axes: dict[str, Any] = {
-        key: tuple(value if isinstance(value, str) else float(value) for value in values)
-        for key, values in grid.items()
-        if isinstance(values, Iterable)
-    }
-    return PredictSettings(**{key: values for key, values in axes.items() if values})
 
 
 def _predictable_sweeps(result: Result, campaign: Campaign) -> list[MeasuredSweep]:

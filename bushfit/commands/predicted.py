@@ -91,7 +91,7 @@ class PredictionOutput:
             for predictions in by_direction(self.predictions)
         }
         for resonance in self.resonances:
-            document[f"{resonance.place}_resonance"] = table_columns(tables.predicted_resonance_table(resonance))
+            document[f"{resonance.direction}_resonance"] = table_columns(tables.predicted_resonance_table(resonance))
         for curves in by_direction(self.static):
             document[f"{curves[0].direction}_static"] = table_columns(joined_table(tables.static_table, curves))
         if self.arms:

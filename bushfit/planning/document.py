@@ -161,7 +161,6 @@ def plan_document(
     """
     knowledge, request, minutes = search.knowledge, search.request, search.minutes_of(runs)
     planned, standard = search.count_runs(runs), search.count_runs(search.standard_runs)
-    standard_amounts = detectable_amounts(search, standard)
     covariances = [search.error_covariance(counts) for counts in (0 * planned, planned, standard)]
 
     def compared(error: Callable[[Array], float]) -> ErrorComparison:
@@ -172,7 +171,7 @@ def plan_document(
         before, with_plan, with_standard = map(error, covariances)
         return {"before": before, "planned": with_plan, "standard": with_standard}
 
-    errors: dict[str, dict[str, ErrorComparison]] = {"stiffness": {}, "loss_factor": {}}
+    errors = defaultdict[str, dict[str, ErrorComparison]](dict)
     for quantity in search.predictions:
         errors[quantity.name.partition(".")[0]][str(quantity.place)] = compared(quantity.rms_error)
     rivals: Rivalry | None = None
@@ -202,30 +201,14 @@ def plan_document(
         },
         "stiffness": errors["stiffness"],
         "loss_factor": errors["loss_factor"],
-        "visible": {
-            name: {
-                "parameter": qualified_name(get_effect(name), get_effect(name).amount),
-                "unit": get_effect(name).amount.unit,
-                "planned": amount,
-                "standard": standard_amounts[name],
-            }
-            for name, amount in detectable_amounts(search, planned).items()
-        },
+        "visible": detectable_amounts(search, planned, standard),
         "rivals": rivals,
         **to_entries(warnings),
     }
 
 
 def planned_run(test: Test, minutes: float) -> PlannedRun:
-    """Make the entry of plan.json for one run of a test.
-
-    Args:
-        test: loop or sweep.
-        minutes: duration with the change of direction before it [min].
-
-    Returns:
-        Keys and values of the entry, in SI units.
-    """
+    """Make the entry of plan.json for one run of a test, which takes `minutes` with the change of direction before."""
     frequencies, amplitudes = (np.unique(axis).tolist() for axis in operating_points(test))
     return {
         "place": str(test.direction),
@@ -239,15 +222,16 @@ def planned_run(test: Test, minutes: float) -> PlannedRun:
     }
 
 
-def detectable_amounts(search: PlanSearch, counts: Array) -> dict[str, float | None]:
-    """Compute the smallest amount of each effect that given runs detect in 90 % of the cases, at a significance of 5 %.
+def detectable_amounts(search: PlanSearch, planned: Array, standard: Array) -> dict[str, DetectableEntry]:
+    """Compute the smallest amount of each effect that tests detect in 90 % of the cases, at a significance of 5 %.
 
     Args:
         search: search with the candidate tests.
-        counts: number of runs of each test, (tests,).
+        planned: number of runs of each test in the plan, (tests,).
+        standard: number of runs of each test in the standard programme, (tests,).
 
     Returns:
-        Amount [SI] by name, for effects that the standard programme can detect; None if the runs detect none.
+        Amounts [SI] by name of the effect, for effects that the standard programme can detect.
 
     Notes:
         Noise alone would permit amounts that many repeats average out, such as 0.1 g of moving mass. The accuracy
@@ -256,13 +240,18 @@ def detectable_amounts(search: PlanSearch, counts: Array) -> dict[str, float | N
         as the frequencies of a resonance, the median is reported: the most visible one, a resonance at a tested
         frequency, is a rare case.
     """
-    model = search.models[0]
-    ratios = model.class_ratios[counts > 0].max(axis=0, initial=0.0)
-    with np.errstate(divide="ignore"):
-        smallest = np.maximum(DETECTABLE / np.sqrt(model.total(counts).noncentralities()[0]), 1.0 / ratios)
-    amounts = defaultdict[str, list[float]](list)
+    model, smallest, shapes = search.models[0], [], defaultdict[str, list[int]](list)
+    for counts in (planned, standard):
+        ratios = model.class_ratios[counts > 0].max(axis=0, initial=0.0)
+        with np.errstate(divide="ignore"):
+            smallest.append(np.maximum(DETECTABLE / np.sqrt(model.total(counts).noncentralities()[0]), 1.0 / ratios))
     for index in np.flatnonzero(search.minimum_noncentrality).tolist():
-        effect = search.effects[index]
-        amounts[effect.name].append(effect.amount.typical * float(smallest[index]))
-    medians = {name: float(np.median(sizes)) for name, sizes in amounts.items()}
-    return {name: median if np.isfinite(median) else None for name, median in medians.items()}
+        shapes[search.effects[index].name].append(index)
+    entries = dict[str, DetectableEntry]()
+    for name, indices in shapes.items():
+        effect, amount = get_effect(name), get_effect(name).amount
+        sizes = amount.typical * np.median(np.array(smallest)[:, indices], axis=1)
+        plan_size, standard_size = (size if np.isfinite(size) else None for size in sizes.tolist())
+        parameter = qualified_name(effect, amount)
+        entries[name] = {"parameter": parameter, "unit": amount.unit, "planned": plan_size, "standard": standard_size}
+    return entries

@@ -37,24 +37,19 @@ class Information(NamedTuple):
     A departure is the change of the residuals due to a missing effect of typical amount, or due to a rival model.
 
     Args:
-        products: inner products of the residuals' derivatives by parameter with these derivatives and with the
-            departures, (choices, k, k + e).
+        parameters: Fisher information on relative changes of the parameters, (choices, k, k).
+        cross: inner products of the residuals' derivatives by parameter with the departures, (choices, k, e).
         squares: sum of squares of each departure over the residuals, (choices, e).
     """
 
-    products: Array
+    parameters: Array
+    cross: Array
     squares: Array
-
-    @property
-    def parameters(self) -> Array:
-        """Fisher information on relative changes of the k parameters, for each set of tests, (choices, k, k)."""
-        return self.products[..., : self.products.shape[-2]]
 
     def noncentralities(self) -> Array:
         """Expected increase of chi-square by each departure, after a refit of the model to the tests, (choices, e)."""
-        cross = self.products[..., self.products.shape[-2] :]
-        fitted = np.linalg.solve(self.parameters, cross)
-        return np.maximum(self.squares - np.sum(cross * fitted, axis=-2), 0.0)
+        fitted = np.linalg.solve(self.parameters, self.cross)
+        return np.maximum(self.squares - np.sum(self.cross * fitted, axis=-2), 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +94,7 @@ class ModelInformation:
         solved = np.linalg.solve(np.eye(2) + shared[..., :2] * self.level, shared)
         remaining = products[..., 2:, 2:] - shared[..., 2 : 2 + k].mT @ solved[..., 2:]
         decrease = np.sum(shared[..., 2 + k :] * solved[..., 2 + k :], axis=-2)
-        return Information(remaining, self.squares * counts[:, None] - decrease)
+        return Information(remaining[..., :k], remaining[..., k:], self.squares * counts[:, None] - decrease)
 
     def total(self, counts: Array) -> Information:
         """Fisher information of the prior and all runs together (one set of tests).
@@ -107,10 +102,8 @@ class ModelInformation:
         Args:
             counts: number of runs of each candidate test, (tests,).
         """
-        tests = self.of_runs(counts)
-        products, k = tests.products.sum(axis=0, keepdims=True), len(self.prior)
-        products[..., :k] += self.prior
-        return Information(products, tests.squares.sum(axis=0, keepdims=True))
+        parameters, cross, squares = (part.sum(axis=0, keepdims=True) for part in self.of_runs(counts))
+        return Information(parameters + self.prior, cross, squares)
 
     def with_one_more(self, counts: Array) -> Information:
         """Fisher information of the prior and all runs if one test is run once more; one choice for each test.

@@ -9,12 +9,12 @@ from itertools import combinations
 import numpy as np
 
 from bushfit.effects import Level
-from bushfit.effects.contract import Array, RubberConditions
-from bushfit.geometry import Place
+from bushfit.effects.contract import Array
 from bushfit.model.covariance import Z95, Covariance
 from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.model.sensitivity import stiffness_and_slopes
+from bushfit.prediction.conditions import OperatingPoints
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,18 +140,13 @@ class Uncertainty:
         return Band(value, value - half, value + half, root)
 
 
-def uncertainty(
-    result: Result, model: Model, place: Place, frequency: Array, amplitude: Array, conditions: RubberConditions
-) -> Uncertainty:
+def uncertainty(result: Result, model: Model, points: OperatingPoints) -> Uncertainty:
     """Collect the errors of a prediction with one model at operating points.
 
     Args:
         result: fitted result, which provides the covariance and the model error.
         model: the fitted model or a variant with fewer or other effects.
-        place: direction or specimen.
-        frequency: frequency of each point [Hz], (n,).
-        amplitude: zero-to-peak amplitude of each point [m, rad or 1], (n,).
-        conditions: temperature of the rubber.
+        points: operating points.
 
     Returns:
         Errors of parameters and model. An unnamed correction or a model error adds an error of the real and an error of
@@ -159,6 +154,7 @@ def uncertainty(
         effects that `model` lacks: the measured stiffness minus an effect is as uncertain as the effect. An untested
         direction of a bushing gets the model error of the tested directions at equal strain.
     """
+    place, frequency, amplitude, conditions = points
     names = [name for name in result.covariance.names if name in model.values]
     covariance = result.covariance.restricted(names)
     correction = model.unnamed or (result.model_error and result.model_error.with_untested(place))

@@ -11,6 +11,7 @@ from bushfit.effects.contract import Array
 from bushfit.geometry import Bushing, Direction, Place, bushing_at
 from bushfit.model.covariance import Z95
 from bushfit.model.result import Result
+from bushfit.prediction.conditions import OperatingPoints
 from bushfit.reading.measurement import SAME_TEMPERATURE
 from bushfit.units import CELSIUS, format_range, number
 
@@ -179,20 +180,13 @@ def format_deviation(ratios: Array) -> str:
 
 
 def extrapolations(
-    result: Result,
-    direction: Place,
-    frequency: Array,
-    amplitude: Array,
-    temperature: float | None = None,
-    subject: str | None = None,
+    result: Result, points: OperatingPoints, temperature: float | None = None, subject: str | None = None
 ) -> Iterator[Caveat]:
     """Generate warnings for frequencies, strains and a temperature outside of the fitted range.
 
     Args:
         result: fitted result.
-        direction: direction or specimen.
-        frequency: frequencies of the prediction [Hz], (n,).
-        amplitude: zero-to-peak amplitudes of the prediction [m, rad or 1], (n,).
+        points: operating points of the prediction; their conditions are not used.
         temperature: temperature of the prediction [K]; None for the reference temperature.
         subject: beginning of the warnings; None for the name of the direction.
 
@@ -201,18 +195,18 @@ def extrapolations(
     """
     if result.measured is None:
         return
-    subject = subject or str(direction)
+    subject = subject or str(points.place)
     if temperature and (tested := result.measured.temperature):
         predicted, *ends = (number(kelvin - CELSIUS, 3) for kelvin in (temperature, *tested))
         if not tested[0] - SAME_TEMPERATURE <= temperature <= tested[1] + SAME_TEMPERATURE:
             fitted = f"predicted at {predicted} degC, but fitted at {' to '.join(dict.fromkeys(ends))} degC only"
             sentence = f"{fitted}: extrapolated by the law of Williams, Landel and Ferry"
             yield Caveat("extrapolated_temperature", sentence).about(subject)
-    percent = 100.0 * result.model.unit_strain(direction)
+    strain_percent = 100.0 * result.model.unit_strain(points.place) * points.amplitude
     fitted_percent = [100.0 * end for end in result.measured.strain]
     for kind, axis, unit, digits, values, (low, high) in (
-        ("extrapolated_frequency", "frequencies", "Hz", 3, frequency, result.measured.frequency),
-        ("extrapolated_strain", "strains", "%", 2, percent * amplitude, fitted_percent),
+        ("extrapolated_frequency", "frequencies", "Hz", 3, points.frequency, result.measured.frequency),
+        ("extrapolated_strain", "strains", "%", 2, strain_percent, fitted_percent),
     ):
         if values.min() < low * (1 - MARGIN) or values.max() > high * (1 + MARGIN):
             predicted, fitted = (

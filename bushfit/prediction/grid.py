@@ -1,8 +1,8 @@
 """Grids of a prediction: requested, measured, or the paper's grid within the measured range."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, Literal
+from typing import Any, Literal, TypedDict
 
 import numpy as np
 
@@ -17,6 +17,8 @@ from bushfit.reading.runs import nominal
 from bushfit.simulation.undisturbed import PAPER_AMPLITUDES as PAPER_AMPLITUDES
 from bushfit.simulation.undisturbed import PAPER_FREQUENCIES as PAPER_FREQUENCIES
 
+#: Frequencies, amplitudes or other numbers of a grid.
+Numbers = Sequence[float] | Array
 #: Amplitudes of each kind of motion where none were measured: those of torsion [rad], which the paper did not measure,
 #: and of the material's strain [1] are chosen so that strains are like the paper's.
 _AMPLITUDES_OF = {
@@ -32,6 +34,24 @@ _FREQUENCIES = 9
 _AMPLITUDES = 3
 #: Largest number of grid values over a range that the test did not control: tables stay readable, and curves smooth.
 _MOST_STEPS = 10
+
+
+class GridOptions(TypedDict, total=False):
+    """Directions and operating points of a prediction; a missing key, or None, selects the default.
+
+    Args:
+        directions: directions or specimens by name.
+        frequencies: frequencies [Hz].
+        amplitudes: zero-to-peak displacements [m].
+        torsion_amplitudes: zero-to-peak rotations [rad].
+        strain_amplitudes: zero-to-peak strains of specimens that give a modulus.
+    """
+
+    directions: Sequence[str] | None
+    frequencies: Numbers | None
+    amplitudes: Numbers | None
+    torsion_amplitudes: Numbers | None
+    strain_amplitudes: Numbers | None
 
 
 def requested_grid(default: tuple[Array, Array], requested: PredictSettings, place: Place) -> tuple[Array, Array]:
@@ -65,10 +85,20 @@ def static_reach(result: Result, place: Place, amplitudes: Array, requested: Pre
     return max(float(amplitudes.max()), *(() if is_requested else loops), 0.0)
 
 
-def grid_settings(requested: PredictSettings, campaign: Campaign | None) -> PredictSettings:
-    """Complete the prediction settings of a command with the [predict] table of a campaign, if there is one."""
-    overrides = {key: value for key, value in vars(requested).items() if value is not None}
-    return replace(campaign.predict if campaign else PredictSettings(), **overrides)
+def grid_settings(options: Mapping[str, object], campaign: Campaign | None = None) -> PredictSettings:
+    """Settings of a prediction: the given options, else the [predict] table of a campaign, else None for the default.
+
+    Args:
+        options: directions and operating points, as of `GridOptions`.
+        campaign: campaign; None without one.
+    """
+    requested: dict[str, Any] = {
+        key: tuple(value if isinstance(value, str) else float(value) for value in values)
+        for key, values in options.items()
+        if isinstance(values, Iterable)
+    }
+    settings = campaign.predict if campaign else PredictSettings()
+    return replace(settings, **{key: values for key, values in requested.items() if values})
 
 
 def default_grid(result: Result, direction: Place, sweeps: Sequence[Sweep] = ()) -> tuple[Array, Array]:

@@ -15,6 +15,7 @@ from bushfit.model.covariance import Z95
 from bushfit.model.result import Result
 from bushfit.model.transfer import FACTOR_SPREAD, factor_spread, with_factor
 from bushfit.prediction.bands import uncertainty
+from bushfit.prediction.conditions import OperatingPoints
 
 
 def predict_each_bushing(
@@ -59,7 +60,8 @@ def predict_each_bushing(
 def _inside(result: Result, test: MeasuredTest) -> Array:
     """True for each operating point of a test whose |K| is within the 95 % band of prediction and noise, (n,)."""
     ratio = test.measured / test.noise_free(result.model).measured
-    errors = uncertainty(result, result.model, test.direction, test.frequency, test.amplitude, test.conditions)
+    points = OperatingPoints(test.direction, test.frequency, test.amplitude, test.conditions)
+    errors = uncertainty(result, result.model, points)
     slopes = log_slopes(result.model, test, errors.covariance.names)
     band = errors.band(np.zeros(ratio.size), np.concatenate((slopes, errors.relative)).real)
     noise = test.relative_noise

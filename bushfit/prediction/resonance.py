@@ -16,7 +16,7 @@ from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.prediction.bands import alternative_models, car_models
 from bushfit.prediction.caveats import extrapolations, unfitted_warnings
-from bushfit.prediction.stiffness import add_conditions, rubber_conditions
+from bushfit.prediction.conditions import OperatingPoints, PredictedPlace, rubber_conditions
 from bushfit.reading.preload import Preload
 from bushfit.reduction.resonance import shaken_response
 from bushfit.units import number
@@ -33,11 +33,11 @@ _NEAR_PEAK = 1.5
 
 
 @dataclass(frozen=True, eq=False)
-class PredictedResonance:
+class PredictedResonance(PredictedPlace):
     """Predicted response of a mass on a bushing whose base is shaken with a sine of constant acceleration.
 
     Args:
-        place: direction or specimen.
+        direction: direction or specimen.
         mass: mass on the bushing [kg].
         base_acceleration: zero-to-peak acceleration of the base [m/s^2].
         frequency: frequency of each point [Hz], (n,).
@@ -50,7 +50,7 @@ class PredictedResonance:
         conditions: preload and temperature of the rubber, as of `rubber_conditions`.
     """
 
-    place: Place
+    direction: Place
     mass: float
     base_acceleration: float
     frequency: Array
@@ -60,11 +60,6 @@ class PredictedResonance:
     warnings: tuple[Caveat, ...] = ()
     if_in_rig: PredictedResonance | None = None
     conditions: RubberConditions = UNKNOWN
-
-    @property
-    def label(self) -> str:
-        """Direction or specimen for users, with its conditions: "axial at a preload of 500 N"."""
-        return add_conditions(str(self.place), self.conditions, self.place)
 
     @property
     def peak(self) -> tuple[float, float]:
@@ -121,10 +116,8 @@ def predict_resonance(
     predicted, if_in_rig = shaken(bushings), shaken(rig_models[-1]) if rig_models else None
     near = np.abs(predicted.transmissibility) >= min(_NEAR_PEAK, predicted.peak[1])
     subject = f"{place}, resonance of {number(mass, 3)} kg"
-    warnings = [
-        *unfitted_warnings(result, place),
-        *extrapolations(result, place, frequency[near], predicted.amplitude[near], temperature, subject),
-    ]
+    points = OperatingPoints(place, frequency[near], predicted.amplitude[near])
+    warnings = [*unfitted_warnings(result, place), *extrapolations(result, points, temperature, subject)]
     if result.alternatives:
         peaks = np.array([shaken(model).peak for _, model in alternative_models(result, rig=False)])
         (low, smallest), (high, largest) = peaks.min(axis=0), peaks.max(axis=0)

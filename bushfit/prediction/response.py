@@ -16,7 +16,7 @@ from bushfit.model.result import Result
 from bushfit.model.sensitivity import force_and_slopes
 from bushfit.prediction.bands import Band, envelope, uncertainty
 from bushfit.prediction.caveats import BEYOND, MARGIN, extrapolations, unfitted_warnings
-from bushfit.prediction.stiffness import add_conditions, rubber_conditions
+from bushfit.prediction.conditions import OperatingPoints, PredictedPlace, rubber_conditions
 from bushfit.prediction.superposed import correction_factor, timed_candidates
 from bushfit.reduction.displacement import noise_and_highest_frequency
 from bushfit.units import number
@@ -35,7 +35,7 @@ _CORRECTED = 200
 
 
 @dataclass(frozen=True, eq=False)
-class TimeResponse:
+class TimeResponse(PredictedPlace):
     """Predicted force over time for a displacement history, with figures of the motion.
 
     Args:
@@ -55,11 +55,6 @@ class TimeResponse:
     tested: tuple[float, float] | None = None
     warnings: tuple[Caveat, ...] = ()
     conditions: RubberConditions = UNKNOWN
-
-    @property
-    def label(self) -> str:
-        """Direction or specimen for users, with its conditions: "axial at 60 degC"."""
-        return add_conditions(str(self.direction), self.conditions, self.direction)
 
     @property
     def peak(self) -> float:
@@ -158,7 +153,8 @@ def _force(result: Result, model: Model, place: Place, history: History, conditi
     """
     amplitude = np.array([np.abs(history.value).max(), np.sqrt(2.0) * np.std(history.value)])
     amplitude = np.maximum(amplitude, np.finfo(float).eps)
-    errors = uncertainty(result, model, place, np.full(2, history.frequency), amplitude, conditions)
+    points = OperatingPoints(place, np.full(2, history.frequency), amplitude, conditions)
+    errors = uncertainty(result, model, points)
     named = model.without(UNNAMED)
     if named.structure.layers:  # one model's solution of implicit equations is the start for its derivatives
         named.force(place, history, kind="loop", conditions=conditions)
@@ -197,7 +193,7 @@ def _corrected_force(force: Array, model: Model, place: Place, history: History,
     frequency = np.fft.rfftfreq(samples, history.step)[1:]
     grid = np.geomspace(frequency[0], frequency[-1], _CORRECTED)
     amplitude = np.maximum(np.sqrt(2.0) * np.std(history.value), np.finfo(float).eps)
-    factor = correction_factor(model, place, grid, amplitude, conditions)
+    factor = correction_factor(model, OperatingPoints(place, grid, amplitude, conditions))
     spectrum = np.fft.rfft(force, samples)
     spectrum[1:] *= np.interp(np.log(frequency), np.log(grid), factor)
     return np.fft.irfft(spectrum, samples)[: force.size]
@@ -231,7 +227,8 @@ def _warnings(result: Result, response: TimeResponse, left_out: list[str], tempe
     warnings = [*result.undecided, *unfitted_warnings(result, place)]
     if result.measured:
         largest = max(np.abs(history.value).max(), result.measured.strain[0] / response.unit_strain)
-        warnings += extrapolations(result, place, np.array([history.frequency]), np.array([largest]), temperature)
+        point = OperatingPoints(place, np.array([history.frequency]), np.array([largest]))
+        warnings += extrapolations(result, point, temperature)
     if response.tested and (share := response.shares_beyond[1]):
         rate = (
             f"{number(np.abs(response.strain_rate).max(), 3)} 1/s, but fitted at up to {number(response.tested[1], 3)}"

@@ -15,7 +15,7 @@ from bushfit.model.result import Result
 from bushfit.model.sensitivity import force_and_slopes
 from bushfit.prediction.bands import Band, envelope, uncertainty
 from bushfit.prediction.caveats import extrapolations
-from bushfit.prediction.stiffness import add_conditions, rubber_conditions
+from bushfit.prediction.conditions import OperatingPoints, PredictedPlace, rubber_conditions
 from bushfit.prediction.superposed import correction_factor, timed_candidates
 from bushfit.reading.preload import Preload
 from bushfit.units import number
@@ -27,7 +27,7 @@ _POINTS, _SAMPLES = 101, 10
 
 
 @dataclass(frozen=True, eq=False)
-class StaticCurve:
+class StaticCurve(PredictedPlace):
     """Force over displacement in the steady state of a slow triangular motion.
 
     Args:
@@ -53,11 +53,6 @@ class StaticCurve:
     rate: float
     warnings: tuple[Caveat, ...] = ()
     conditions: RubberConditions = UNKNOWN
-
-    @property
-    def label(self) -> str:
-        """Direction or specimen for users, with its conditions: "axial at a preload of 500 N"."""
-        return add_conditions(str(self.direction), self.conditions, self.direction)
 
     @property
     def rate_text(self) -> str:
@@ -122,8 +117,8 @@ def static_curve(
     conditions = rubber_conditions(result, place, temperature, preload)
     parts = [_forces(source, model, place, displacement, rate, conditions) for source, model in models]
     loading, unloading, mean, slope, secant = (envelope(bands) for bands in zip(*parts, strict=True))
-    point = np.array([rate / (4.0 * reach)]), np.array([reach])
-    warnings = (*extrapolations(result, place, *point, temperature, f"{place}, static curve"), *untimed)
+    point = OperatingPoints(place, np.array([rate / (4.0 * reach)]), np.array([reach]))
+    warnings = (*extrapolations(result, point, temperature, f"{place}, static curve"), *untimed)
     return StaticCurve(place, displacement, loading, unloading, mean, slope, secant, rate, warnings, conditions)
 
 
@@ -146,11 +141,12 @@ def _forces(
     strokes = np.linspace(displacement[0], displacement[-1], _SAMPLES * (_POINTS - 1) + 1)
     frequency = rate / (4.0 * displacement[-1])
     cycle = History.steady(np.concatenate((strokes, strokes[-2:0:-1])), frequency)
-    errors = uncertainty(result, model, place, np.array([frequency]), displacement[-1:], conditions)
+    point = OperatingPoints(place, np.array([frequency]), displacement[-1:], conditions)
+    errors = uncertainty(result, model, point)
     force, slopes = force_and_slopes(model.without(UNNAMED), place, cycle, errors.covariance.names, conditions)
     changes = np.concatenate((force[None], slopes, errors.relative.real * force))
     if model.unnamed:  # as in a sine of the same frequency and amplitude
-        changes *= np.abs(correction_factor(model, place, np.array([frequency]), displacement[-1:], conditions))
+        changes *= np.abs(correction_factor(model, point))
     loading = changes[:, : strokes.size : _SAMPLES]
     unloading = np.roll(changes, -1, axis=-1)[:, ::-1][:, : strokes.size : _SAMPLES]
     mean = 0.5 * (loading + unloading)

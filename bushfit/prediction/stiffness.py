@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -17,7 +16,6 @@ import numpy as np
 from bushfit.caveat import Caveat
 from bushfit.effects import Level
 from bushfit.effects.contract import UNKNOWN, Array, RubberConditions
-from bushfit.effects.temperature import REFERENCE
 from bushfit.errors import ModelError
 from bushfit.fitting.preparation import MeasuredSweep
 from bushfit.geometry import Place
@@ -33,10 +31,11 @@ from bushfit.prediction.caveats import (
     rig_effects,
     unfitted_warnings,
 )
+from bushfit.prediction.conditions import OperatingPoints, PredictedPlace, rubber_conditions
 from bushfit.prediction.superposed import LargeMotion, superposed_stiffness_and_slopes, timed_candidates
-from bushfit.reading.preload import SAME_PRELOAD, Preload
+from bushfit.reading.preload import Preload
 from bushfit.reading.runs import nominal
-from bushfit.units import CELSIUS, number
+from bushfit.units import number
 
 #: Predicted quantities.
 _BANDS = ("stiffness", "loss_factor", "storage_stiffness", "loss_stiffness")
@@ -45,7 +44,7 @@ _SAME = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class Prediction:
+class Prediction(PredictedPlace):
     """Predicted dynamic stiffness K' + i K'' at n operating points, sorted by amplitude, then frequency.
 
     Args:
@@ -83,14 +82,9 @@ class Prediction:
         """Predicted complex stiffness K' + i K'', in the unit of |K|, (n,)."""
         return self.storage_stiffness.value + 1j * self.loss_stiffness.value
 
-    @property
-    def label(self) -> str:
-        """Direction or specimen for users, with conditions and large motion: "axial at a preload of 500 N"."""
-        return self.add_conditions(str(self.direction))
-
     def add_conditions(self, text: str) -> str:
         """Add preload, temperature and large motion to the text on a prediction, as in "axial at 60 degC over 1 mm"."""
-        text = add_conditions(text, self.conditions, self.direction)
+        text = super().add_conditions(text)
         return f"{text} over {self.over.describe(self.direction)}" if self.over else text
 
 
@@ -136,16 +130,16 @@ def predict(
         axis.ravel() for axis in np.meshgrid(np.unique(amplitudes), np.unique(frequencies), indexing="ij")
     )
     conditions = rubber_conditions(result, direction, temperature, preload)
+    points = OperatingPoints(direction, frequency, amplitude, conditions)
     if over:
         models, untimed = timed_candidates(result, f"{direction}, with the large motion", rig=rig)
         over.check_superposable(direction, frequency)
-        point = np.array([over.frequency or frequency.min()]), np.array([abs(over.displacement) + amplitude.max()])
-        together = extrapolations(result, direction, *point, temperature, f"{direction}, with the large motion")
+        both = np.array([over.frequency or frequency.min()]), np.array([abs(over.displacement) + amplitude.max()])
+        subject = f"{direction}, with the large motion"
+        together = extrapolations(result, OperatingPoints(direction, *both), temperature, subject)
     else:
         models, untimed, together = candidates(result, rig=rig), [], iter(())
-    predictions = list[Prediction]()
-    for source, model in models:
-        predictions.append(predict_with_model(source, model, direction, frequency, amplitude, conditions, over))
+    predictions = [predict_with_model(source, model, points, over) for source, model in models]
     bands: dict[str, Any] = {
         name: envelope([getattr(prediction, name) for prediction in predictions]) for name in _BANDS
     }
@@ -153,8 +147,7 @@ def predict(
         predictions[0],
         **bands,
         if_in_rig=predictions[2 ** len(result.unresolved) - 1] if result.unresolved and not rig else None,
-        measured=None if sweeps is None else measured_stiffness(direction, frequency, amplitude, sweeps),
-        conditions=conditions,
+        measured=None if sweeps is None else measured_stiffness(points, sweeps),
         over=over,
     )
     compared = replace(prediction, measured=None) if rig else prediction
@@ -183,8 +176,8 @@ def point_warnings(
     if measured is not None and agrees_within_noise(result, place):
         confirmed = np.isfinite(measured)
     if not confirmed.all():
-        points = prediction.frequency[~confirmed], prediction.amplitude[~confirmed]
-        yield from extrapolations(result, place, *points, temperature)
+        points = OperatingPoints(place, prediction.frequency[~confirmed], prediction.amplitude[~confirmed])
+        yield from extrapolations(result, points, temperature)
     requested = {"temperature": temperature, "preload": preload}
     conditions = {name for name, value in requested.items() if value is not None}
     effects = result.model.without(Level.INSTRUMENT).records
@@ -206,99 +199,22 @@ def point_warnings(
         yield Caveat("stiffness_if_rig", sentence).about(place)
 
 
-def add_conditions(text: str, conditions: RubberConditions, place: Place) -> str:
-    """Add preload and temperature, if known, to the text on a prediction: "axial at a preload of 500 N and 60 degC".
-
-    Args:
-        text: text on the prediction.
-        conditions: conditions of the rubber, with a single temperature.
-        place: direction or specimen.
-    """
-    known = [] if conditions.preload is None else [f"a preload of {conditions.preload.text(place)}"]
-    known += [] if conditions.temperature is None else [f"{number(float(conditions.temperature) - CELSIUS, 3)} degC"]
-    return f"{text} at {' and '.join(known)}" if known else text
-
-
-def rubber_conditions(
-    result: Result, place: Place, temperature: float | None = None, preload: Preload | None = None
-) -> RubberConditions:
-    """Temperature and preload of a prediction; None in place of a condition on which the model does not depend.
-
-    Args:
-        result: fitted result.
-        place: direction or specimen.
-        temperature: temperature [K]; None for the reference temperature.
-        preload: requested preload, as of `tested_preload`.
-    """
-    kelvin = (REFERENCE if temperature is None else temperature) if "temperature" in result.model.depends_on else None
-    return RubberConditions(kelvin, preload=tested_preload(result, place, preload))
-
-
-def tested_preload(result: Result, place: Place, preload: Preload | None) -> Preload | None:
-    """Choose the preload of a prediction: the requested one, if it is within the tested range, or the default.
-
-    Args:
-        result: fitted result.
-        place: direction or specimen.
-        preload: requested preload; None for the tested preload nearest to zero.
-
-    Returns:
-        The preload; None if it is not requested and the model does not depend on it in this direction.
-
-    Raises:
-        ModelError: the tests of this direction do not have several preloads, or none as small or as large.
-    """
-    ranges = result.measured.preloads if result.measured else ()
-    tested = next((preload_range for preload_range in ranges if preload_range.place == str(place)), None)
-    if preload is None:
-        return Preload(float(np.clip(0.0, tested.low, tested.high)), tested.unit) if tested else None
-    if result.measured is None and "preload" in result.model.depends_on:  # of a simulation: exact, without a range
-        return preload
-    refuse = partial(ModelError, place=str(place), found=f"a preload of {preload.text(place)}")
-    if tested is None:
-        raise refuse(
-            "the model was not fitted to several preloads of this direction",
-            expected="tests at two or more preloads",
-            hint='state preload = "500 N" for each test of the campaign, "none" without preload, and fit again',
-        )
-    margin = SAME_PRELOAD * max(abs(tested.low), abs(tested.high))
-    if preload.unit != tested.unit and preload.value:
-        raise refuse("the tests state the preload in another quantity", expected=tested.text(place))
-    if not tested.low - margin <= preload.value <= tested.high + margin:
-        hint = "test the bushing at this preload, and fit all tests together"
-        raise refuse("this preload is outside the tested range", expected=tested.text(place), hint=hint)
-    return Preload(preload.value, tested.unit)
-
-
-def predict_with_model(
-    result: Result,
-    model: Model,
-    direction: Place,
-    frequency: Array,
-    amplitude: Array,
-    conditions: RubberConditions,
-    over: LargeMotion | None = None,
-) -> Prediction:
+def predict_with_model(result: Result, model: Model, points: OperatingPoints, over: LargeMotion | None) -> Prediction:
     """Predict the stiffness with one model, with the uncertainty of the fit and the error of the model.
 
     Args:
         result: fitted result, which provides the covariance and the model error.
         model: the fitted model or a variant with fewer or other effects.
-        direction: direction or specimen.
-        frequency: frequency of each point [Hz], (n,).
-        amplitude: zero-to-peak amplitude of each point [m, rad or 1], (n,).
-        conditions: temperature and preload of the rubber.
+        points: operating points.
         over: slow large motion or static offset under the harmonic; None for the harmonic alone.
 
     Returns:
         Prediction without warnings.
     """
-    errors = uncertainty(result, model, direction, frequency, amplitude, conditions)
+    (direction, frequency, amplitude, conditions), errors = points, uncertainty(result, model, points)
     names = errors.covariance.names
     if over:
-        stiffness, slopes = superposed_stiffness_and_slopes(
-            model, direction, frequency, amplitude, over, names, conditions
-        )
+        stiffness, slopes = superposed_stiffness_and_slopes(model, points, over, names)
     else:
         stiffness, slopes = stiffness_and_slopes(model, direction, frequency, amplitude, names, conditions=conditions)
     slopes = np.concatenate((slopes, errors.relative * stiffness))
@@ -311,28 +227,27 @@ def predict_with_model(
         loss_factor=errors.band(loss_factor, (1.0 + loss_factor**2) * relative.imag),
         storage_stiffness=errors.band(stiffness.real, slopes.real),
         loss_stiffness=errors.band(stiffness.imag, slopes.imag),
+        conditions=conditions,
     )
 
 
-def measured_stiffness(direction: Place, frequency: Array, amplitude: Array, sweeps: Sequence[MeasuredSweep]) -> Array:
+def measured_stiffness(points: OperatingPoints, sweeps: Sequence[MeasuredSweep]) -> Array:
     """Average the measured stiffness at operating points.
 
     Args:
-        direction: direction or specimen.
-        frequency: frequency of each point [Hz], (n,).
-        amplitude: zero-to-peak amplitude of each point [m, rad or 1], (n,).
+        points: operating points.
         sweeps: measured sweeps; sweeps of other directions are ignored.
 
     Returns:
         Mean complex stiffness of all measurements within 1 % of each point [N/m or N m/rad], (n,); nan without a
         measurement.
     """
-    mine = [sweep.with_weight() for sweep in sweeps if sweep.direction == direction]
+    mine = [sweep.with_weight() for sweep in sweeps if sweep.direction == points.place]
     f, x, stiffness = (
         np.concatenate([np.empty(0), *(getattr(sweep, name) for sweep in mine)])
         for name in ("frequency", "amplitude", "measured")
     )
-    far = np.minimum(*(np.abs(reached / amplitude[:, None] - 1.0) for reached in (x, nominal(x))))
-    near = (np.abs(f / frequency[:, None] - 1.0) <= MARGIN) & (far <= MARGIN)
+    far = np.minimum(*(np.abs(reached / points.amplitude[:, None] - 1.0) for reached in (x, nominal(x))))
+    near = (np.abs(f / points.frequency[:, None] - 1.0) <= MARGIN) & (far <= MARGIN)
     count = near.sum(axis=1)
     return np.where(count > 0, near @ stiffness / np.maximum(count, 1), np.nan)

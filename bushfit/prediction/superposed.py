@@ -7,7 +7,7 @@ import numpy as np
 
 from bushfit.caveat import Caveat
 from bushfit.effects import Level
-from bushfit.effects.contract import Array, RubberConditions
+from bushfit.effects.contract import Array
 from bushfit.effects.history import History
 from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.errors import ModelError
@@ -16,6 +16,7 @@ from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.model.sensitivity import force_and_slopes
 from bushfit.prediction.bands import candidates
+from bushfit.prediction.conditions import OperatingPoints
 from bushfit.units import format_range, number
 
 #: Samples per cycle of the small harmonic: friction, which turns at samples, has an error of 0.01 %.
@@ -85,24 +86,15 @@ class LargeMotion:
 
 
 def superposed_stiffness_and_slopes(
-    model: Model,
-    place: Place,
-    frequency: Array,
-    amplitude: Array,
-    motion: LargeMotion,
-    names: Sequence[str],
-    conditions: RubberConditions,
+    model: Model, points: OperatingPoints, motion: LargeMotion, names: Sequence[str]
 ) -> tuple[Array, Array]:
     """Complex stiffness of a small harmonic on a large motion, and its derivatives with respect to parameters.
 
     Args:
         model: model; the derivatives are taken at its parameter values.
-        place: direction or specimen.
-        frequency: frequency of the harmonic [Hz], (n,).
-        amplitude: zero-to-peak amplitude of the harmonic [m, rad or 1], (n,).
+        points: frequencies and amplitudes of the harmonic.
         motion: slow motion or offset.
         names: names of k parameters.
-        conditions: temperature and preload of the rubber.
 
     Returns:
         Complex stiffness [N/m or N m/rad], (n,), and its derivatives per SI unit of each parameter, (k, n).
@@ -111,30 +103,21 @@ def superposed_stiffness_and_slopes(
     mean over the slow cycle. An unnamed correction is applied as if there were no slow motion.
     """
     named, columns = model.without(UNNAMED), []
-    for hertz, size in zip(frequency, amplitude, strict=True):
+    for hertz, size in zip(points.frequency, points.amplitude, strict=True):
         history = motion.history(float(hertz), float(size))
-        force, slopes = force_and_slopes(named, place, history, names, conditions)
+        force, slopes = force_and_slopes(named, points.place, history, names, points.conditions)
         line = history.value.size // _SAMPLES
         spectrum = np.fft.rfft(np.concatenate((history.value[None], force[None], slopes)))[:, line]
         columns.append(spectrum[1:] / spectrum[0])
     response = np.array(columns).T
     if model.unnamed:
-        response *= correction_factor(model, place, frequency, amplitude, conditions)
+        response *= correction_factor(model, points)
     return response[0], response[1:]
 
 
-def correction_factor(
-    model: Model, place: Place, frequency: Array, amplitude: Array, conditions: RubberConditions
-) -> Array:
-    """Complex factor by which the unnamed correction of a model changes its stiffness in a sine, (n,).
-
-    Args:
-        model: model with the correction.
-        place: direction or specimen.
-        frequency: frequency [Hz], (n,).
-        amplitude: zero-to-peak amplitude [m, rad or 1], (n,) or a single number.
-        conditions: temperature and preload of the rubber.
-    """
+def correction_factor(model: Model, points: OperatingPoints) -> Array:
+    """Complex factor by which the unnamed correction of a model changes its stiffness in sines at n points, (n,)."""
+    place, frequency, amplitude, conditions = points
     corrected, without = (
         source.stiffness(place, frequency, amplitude, conditions=conditions)
         for source in (model, model.without(UNNAMED))

@@ -155,9 +155,9 @@ def predicted_resonance_table(resonance: PredictedResonance) -> pd.DataFrame:
             "frequency [Hz]": resonance.frequency,
             "transmissibility [-]": np.abs(resonance.transmissibility),
             "phase [deg]": np.degrees(np.angle(resonance.transmissibility)),
-            **amplitude_column(resonance.place, resonance.amplitude),
-            **response_columns(resonance.place, resonance.stiffness),
-            **condition_columns(resonance.conditions, resonance.place),
+            **amplitude_column(resonance.direction, resonance.amplitude),
+            **response_columns(resonance.direction, resonance.stiffness),
+            **condition_columns(resonance.conditions, resonance.direction),
         }
     )
     if resonance.if_in_rig:
