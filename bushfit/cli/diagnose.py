@@ -85,7 +85,7 @@ def print_diagnosis(output: Output, diagnosed: DiagnosisOutput) -> None:
     diagnosis = diagnosed.diagnosis
     print_verdict(output, diagnosed)
     print_findings(output, diagnosed)
-    print_validations(output, diagnosed.validations, diagnosed.validations_before)
+    print_validations(output, diagnosed.validations)
     for effect in diagnosed.document["effects"] if diagnosis.verdict != "ambiguous" else ():
         output.console.print(f"  [bold]why {effect_label(effect['name'])}:[/bold] {escape(effect['evidence'])}")
     print_tests(output, (), diagnosis.result.usable)

@@ -16,21 +16,15 @@ if TYPE_CHECKING:
 _MOST_TESTS = 8
 
 
-def print_validations(output: Output, validations: Sequence[Validation], before: Sequence[Validation] = ()) -> None:
-    """Print, for each validation record, the misfit of the predicted force, and the share of points in its 95 % band.
-
-    Args:
-        output: output of the command.
-        validations: comparisons of measured and predicted force with the model to use.
-        before: comparisons with the model before a diagnosis added effects; empty if none were added.
-    """
+def print_validations(output: Output, validations: Sequence[Validation]) -> None:
+    """Print the misfit of the predicted force in each validation record, and the share of points in its 95 % band."""
     from bushfit.report.response import validation_table
 
     if validations:
-        table = validation_table(validations, before)
+        table = validation_table(validations)
         rows = [(*row[:2], *(number(value, 3) for value in row[2:])) for row in table.itertuples(index=False)]
         title = "validation records (never fitted): predicted force compared with measured force"
-        title += "; before: without the diagnosis" * bool(before)
+        title += "; before: without the diagnosis" * (validations[0].nrmse_before is not None)
         output.print_table(title, list(table.columns), rows, text_columns=2)
     for validation in validations:
         source = validation.record.source

@@ -75,7 +75,7 @@ def print_run(output: Output, name: str, outcome: RunOutput, action: str) -> Non
     if diagnosed and (output.verbose or diagnosed.diagnosis.verdict != "consistent"):
         print_findings(output, diagnosed)
     _print_range(output, outcome)
-    print_validations(output, outcome.validations, diagnosed.validations_before if diagnosed else ())
+    print_validations(output, outcome.validations)
     print_origin(output, result)
     print_predictions(output, outcome.predicted)
     two_step, joint = outcome.two_step, outcome.joint.result

@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import zip_longest
 from pathlib import Path
 
 from bushfit.campaign.campaign import Campaign
@@ -39,7 +38,6 @@ class DiagnosisOutput:
         command: command with its options that repeats the diagnosis.
         files: documents, tables, figure and page.
         validations: comparisons of the model to use with the validation records of the campaign.
-        validations_before: comparisons of the joint fit without the added effects; empty if none were added.
     """
 
     data: PreparedCampaign
@@ -48,7 +46,6 @@ class DiagnosisOutput:
     command: str
     files: Sequence[ResultFile]
     validations: Sequence[Validation] = ()
-    validations_before: Sequence[Validation] = ()
 
     def __repr__(self) -> str:
         return f"{self.data.campaign.name}: {self.headline}\n  {self.diagnosis.summary}"
@@ -131,20 +128,11 @@ def diagnose(
     origin = campaign_document(data, "diagnose", options)
     records = data.campaign.validation
     validations = validate(diagnosis.result, records)
-    before = validate((joint or fit(data)).result, records) if records and diagnosis.added else []
+    if records and diagnosis.added:
+        pairs = zip(validations, validate((joint or fit(data)).result, records), strict=True)
+        validations = [replace(validation, nrmse_before=plain.nrmse) for validation, plain in pairs]
     if validations:
-        document["validation"] = [
-            {
-                "test": validation.record.name,
-                "direction": str(validation.record.direction),
-                "nrmse": validation.nrmse,
-                "nrmse_before": plain_validation.nrmse if plain_validation else None,
-                "peak_gap": validation.peak_gap,
-                "energy_gap": validation.energy_gap,
-                "share_inside": validation.share_inside,
-            }
-            for validation, plain_validation in zip_longest(validations, before)
-        ]
+        document["validation"] = [validation.entry for validation in validations]
     title, gap = data.campaign.name, ResultFile("gap", "table", partial(diagnosed.gap_table, diagnosis))
     files = [
         ResultFile("diagnosis", "json", document),
@@ -153,9 +141,9 @@ def diagnose(
         ResultFile("gap", "figure", lambda: plots.gap.gap_figure(gap.content(), diagnosis.result, document, title)),
         ResultFile("candidates", "table", partial(diagnosed.candidates_table, diagnosis)),
     ]
-    files += validation_files(validations, before, title)
+    files += validation_files(validations, title)
     files.append(ResultFile("report", "page", partial(report_page, files)))
-    return DiagnosisOutput(data, diagnosis, document, command, files, validations, before)
+    return DiagnosisOutput(data, diagnosis, document, command, files, validations)
 
 
 def _require_free_parameter(data: PreparedCampaign, model: Model | None, settings: DiagnosisSettings) -> None:

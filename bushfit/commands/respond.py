@@ -149,18 +149,17 @@ def draw_response(title: str, table: ResultFile, warnings: Sequence[Caveat] = ()
     return plots.response.response_figure(title, table.content(), plots.style.warnings_note(warnings))
 
 
-def validation_files(validations: Sequence[Validation], before: Sequence[Validation], title: str) -> list[ResultFile]:
+def validation_files(validations: Sequence[Validation], title: str) -> list[ResultFile]:
     """Table validation.csv, and for each validation record a table and a figure of measured and predicted force.
 
     Args:
         validations: comparisons with the model to use.
-        before: comparisons without the effects that a diagnosis added; empty if none were added.
         title: beginning of the titles of the figures.
 
     Returns:
         Result files, not yet rendered; empty without records.
     """
-    files = [ResultFile("validation", "table", lambda: validation_table(validations, before))] if validations else []
+    files = [ResultFile("validation", "table", partial(validation_table, validations))] if validations else []
     for validation in validations:
         name = f"validation_{folder_name(validation.record.name)}"
         record_title = f"{title}: {validation.record.name}"

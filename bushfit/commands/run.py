@@ -128,7 +128,7 @@ def run(campaign: Campaign | PreparedCampaign, *, loss: Loss | None = None) -> R
         files += [file for file in diagnosed.files if file.name not in ("model", "report")]
     else:
         validations = validate(predicted.result, data.campaign.validation)
-        files += validation_files(validations, (), data.campaign.name)
+        files += validation_files(validations, data.campaign.name)
     files.append(ResultFile("report", "page", partial(report_page, files)))
     document = {**documents, **to_entries(predicted.warnings)}
     return RunOutput(data, static, two_step, reason, joint, diagnosed, predicted, document, files, validations)

@@ -11,6 +11,7 @@ from typing_extensions import TypedDict
 
 from bushfit.diagnosis.holdout import HeldOut, Skipped
 from bushfit.model.result import ExpectedError
+from bushfit.prediction.validation import ValidationEntry
 
 Verdict = Literal["consistent", "named", "ambiguous", "described", "partly", "unexplained"]
 
@@ -167,28 +168,6 @@ class Description:
     frequency_power: tuple[float, float, float]
     amplitude_power: tuple[float, float, float]
     words: str
-
-
-class ValidationEntry(TypedDict):
-    """Entry of diagnosis.json on one validation record, which no fit used: predicted compared with measured force.
-
-    Args:
-        test: name of the record.
-        direction: direction of the bushing, or name of a specimen.
-        nrmse: rms error of the force with model.json, relative to half the range of the force.
-        nrmse_before: the same without the added effects; null if none were added.
-        peak_gap: relative gap of the largest force, measured minus predicted.
-        energy_gap: relative gap of the work, measured minus predicted.
-        share_inside: share of the measured points inside the 95 % band, 0 to 1.
-    """
-
-    test: str
-    direction: str
-    nrmse: float
-    nrmse_before: float | None
-    peak_gap: float
-    energy_gap: float
-    share_inside: float
 
 
 class DiagnosisFile(TypedDict):

@@ -4,12 +4,35 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from typing_extensions import TypedDict
 
 from bushfit.effects.contract import Array
 from bushfit.effects.history import History
 from bushfit.model.result import Result
 from bushfit.prediction.response import TimeResponse, time_response, work
 from bushfit.reading.measurement import Loop
+
+
+class ValidationEntry(TypedDict):
+    """Entry of diagnosis.json on one validation record, which no fit used: predicted compared with measured force.
+
+    Args:
+        test: name of the record.
+        direction: direction of the bushing, or name of a specimen.
+        nrmse: rms error of the force with model.json, relative to half the range of the force.
+        nrmse_before: the same without the added effects; null if none were added.
+        peak_gap: relative gap of the largest force, measured minus predicted.
+        energy_gap: relative gap of the work, measured minus predicted.
+        share_inside: share of the measured points inside the 95 % band, 0 to 1.
+    """
+
+    test: str
+    direction: str
+    nrmse: float
+    nrmse_before: float | None
+    peak_gap: float
+    energy_gap: float
+    share_inside: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,11 +43,26 @@ class Validation:
         record: record with even times, in SI, (n,).
         response: predicted force at these times, with effects of the rig, as in the test.
         measured: measured force [N, N m or Pa], without the zero error of the force, (n,).
+        nrmse_before: NRMSE of the model without the effects that a diagnosis added; None if none were added.
     """
 
     record: Loop
     response: TimeResponse
     measured: Array
+    nrmse_before: float | None = None
+
+    @property
+    def entry(self) -> ValidationEntry:
+        """Figures of the comparison, as in diagnosis.json."""
+        return {
+            "test": self.record.name,
+            "direction": str(self.record.direction),
+            "nrmse": self.nrmse,
+            "nrmse_before": self.nrmse_before,
+            "peak_gap": self.peak_gap,
+            "energy_gap": self.energy_gap,
+            "share_inside": self.share_inside,
+        }
 
     @property
     def nrmse(self) -> float:

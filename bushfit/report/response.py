@@ -9,6 +9,12 @@ from bushfit.prediction.response import TimeResponse
 from bushfit.prediction.validation import Validation
 from bushfit.report.tables import band_columns
 
+#: Headers of the columns of validation.csv by key of diagnosis.json.
+_PERCENTAGES = {
+    **{"nrmse": "NRMSE [%]", "peak_gap": "peak gap [%]", "energy_gap": "energy gap [%]"},
+    **{"share_inside": "points in band [%]", "nrmse_before": "NRMSE before [%]"},
+}
+
 
 def response_table(time: Any, responses: Sequence[TimeResponse]) -> pd.DataFrame:
     """Table of displacement and force over time.
@@ -31,28 +37,18 @@ def response_table(time: Any, responses: Sequence[TimeResponse]) -> pd.DataFrame
     return pd.DataFrame(columns)
 
 
-def validation_table(validations: Sequence[Validation], before: Sequence[Validation] = ()) -> pd.DataFrame:
+def validation_table(validations: Sequence[Validation]) -> pd.DataFrame:
     """Table of the agreement of predictions with validation records, one row per record.
 
     Args:
         validations: comparisons with the model to use.
-        before: comparisons with the model without the effects that a diagnosis added; empty if none were added.
 
     Returns:
-        Name and direction of each record; NRMSE, relative differences of peak force and energy, and share of the points
-        inside the band, all in percent.
+        Name and direction of each record; NRMSE, relative differences of peak force and energy, share of the points
+        inside the band and, if a diagnosis added effects, NRMSE without these effects, all in percent.
     """
-    columns = {
-        "test": [validation.record.name for validation in validations],
-        "direction": [str(validation.record.direction) for validation in validations],
-        "NRMSE [%]": [100.0 * validation.nrmse for validation in validations],
-        "peak gap [%]": [100.0 * validation.peak_gap for validation in validations],
-        "energy gap [%]": [100.0 * validation.energy_gap for validation in validations],
-        "points in band [%]": [100.0 * validation.share_inside for validation in validations],
-    }
-    if before:
-        columns["NRMSE before [%]"] = [100.0 * validation.nrmse for validation in before]
-    return pd.DataFrame(columns)
+    table = pd.DataFrame([validation.entry for validation in validations]).set_index(["test", "direction"])
+    return (100.0 * table[[*_PERCENTAGES]].dropna(axis=1)).rename(columns=_PERCENTAGES).reset_index()
 
 
 def record_table(validation: Validation) -> pd.DataFrame:
