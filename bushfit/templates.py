@@ -5,10 +5,10 @@ from typing import Any
 
 
 def render_template(file: Path, **values: Any) -> str:
-    """Render a template, whose name is that of the rendered file with the further extension `.jinja`.
+    """Render a template of the package, whose name is that of the rendered file with the further extension `.jinja`.
 
     Args:
-        file: template; texts are escaped if it makes XML.
+        file: template, which may import others by their paths in the package; texts are escaped if it makes XML.
         **values: variables of the template. `finalize`, if given, is a function that is applied to each value before it
             is written.
 
@@ -17,12 +17,14 @@ def render_template(file: Path, **values: Any) -> str:
     """
     import jinja2
 
+    package = Path(__file__).parent
     environment = jinja2.Environment(
         autoescape=".xml" in file.suffixes,
+        loader=jinja2.FileSystemLoader(package),
         finalize=values.pop("finalize", None),
         keep_trailing_newline=True,
         lstrip_blocks=True,
         trim_blocks=True,
         undefined=jinja2.StrictUndefined,
     )
-    return environment.from_string(file.read_text(encoding="utf-8")).render(values)
+    return environment.get_template(file.relative_to(package).as_posix()).render(values)

@@ -2,15 +2,13 @@
 
 import re
 import tomllib
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from bushfit.errors import CONTROL, CampaignError
-from bushfit.geometry import Bushing, Place, Specimen
+from bushfit.geometry import Specimen
 from bushfit.reading.files import line_of, read_utf8
-from bushfit.reading.preload import Preload
-from bushfit.units import CELSIUS
 
 #: A key of more than 16 parts, such as a.b.c; parsing one takes time in proportion to the square of their number.
 _DEEP_KEY = re.compile(rb"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){16}""")
@@ -65,35 +63,6 @@ def parse_toml(path: Path, description: str = "a campaign file", largest: int = 
     raise CampaignError("the tables are nested too deeply", file=path, place=place, expected=expected)
 
 
-def body_lines(bushing: Bushing | None, specimens: Collection[Specimen], effects: Collection[str]) -> list[str]:
-    """Write the tables [bushing], [[bushings]] and [[specimens]] of a campaign file.
-
-    Args:
-        bushing: the bushing; None for several bushings, or for specimens only.
-        specimens: bodies of the same compound.
-        effects: effects of a fit; a bushing that has a stiffness factor among them has `factor = "free"`.
-
-    Returns:
-        Lines of TOML.
-    """
-    lines = []
-    if bushing:
-        lines += ["[bushing]", *_bushing_lines(bushing)]
-    for tube in dict.fromkeys(specimen.bushing for specimen in specimens if specimen.bushing):
-        lines += ["", "[[bushings]]", *_bushing_lines(tube)]
-        lines += ['factor = "free"'] if f"stiffness_factor.{tube.name}" in effects else []
-    for specimen in specimens:
-        lines += [] if specimen.bushing else ["", *specimen_lines(specimen)]
-    return lines
-
-
-def _bushing_lines(bushing: Bushing) -> list[str]:
-    """Write the name, the sizes and, unless it is "paper", the shape of a bushing as lines of TOML."""
-    sizes = [f'{key} = "{getattr(bushing, key) * 1e3:.6g} mm"' for key in ("inner_radius", "outer_radius", "length")]
-    shape = [f'shape = "{bushing.shape}"'] if bushing.shape != "paper" else []
-    return [f"name = {toml_value(bushing.name)}", *sizes, *shape]
-
-
 def specimen_lines(specimen: Specimen) -> list[str]:
     """Write one [[specimens]] table of a campaign file.
 
@@ -110,33 +79,6 @@ def specimen_lines(specimen: Specimen) -> list[str]:
         lines += [f'area = "{specimen.area * 1e6:.12g} mm^2"', f'thickness = "{specimen.thickness * 1e3:.12g} mm"']
         lines.append(f"elements = {specimen.elements}")
     return lines
-
-
-def table_lines(
-    kind: str, file: str, place: Place, temperature: Any = None, preload: Preload | None = None
-) -> list[str]:
-    """Write one [[loops]] or [[sweeps]] table of a campaign file.
-
-    Args:
-        kind: "loops" or "sweeps".
-        file: test file, relative to the campaign.
-        place: direction or specimen that was tested.
-        temperature: temperature of the test [K]; None if unknown.
-        preload: preload of the test; None if unknown.
-
-    Returns:
-        Lines of TOML, the first empty.
-    """
-    warm = [] if temperature is None else [f'temperature = "{temperature - CELSIUS:.6g} degC"']
-    loaded = [] if preload is None else ['preload = "{:.6g} {}"'.format(*preload.in_display_unit(place))]
-    return ["", f"[[{kind}]]", f"file = {toml_value(file)}", *place_lines(place), *warm, *loaded]
-
-
-def place_lines(place: Place) -> list[str]:
-    """Write the TOML lines that state the specimen, or the bushing and direction, of a test."""
-    if not place.axis:
-        return [f"specimen = {toml_value(place.body)}"]
-    return [*([f"bushing = {toml_value(place.body)}"] if place.body else []), f'direction = "{place.axis}"']
 
 
 def toml_value(value: Any) -> str:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from bushfit.campaign.simulated import SimulatedLoop, SimulatedSweep, SimulateSettings
-from bushfit.campaign.toml import body_lines, place_lines, toml_value
+from bushfit.campaign.toml import specimen_lines, toml_value
 from bushfit.effects import BASE, qualified_name
 from bushfit.geometry import Specimen, Unit
 from bushfit.planning.contract import Knowledge, Noise, Test
@@ -56,7 +56,7 @@ def campaign_toml(knowledge: Knowledge, planned: Sequence[Test]) -> str:
     specimens = dict.fromkeys(test.direction for test in planned if isinstance(test.direction, Specimen))
     return render_template(
         Path(__file__).with_name("campaign.toml.jinja"),
-        body=body_lines(knowledge.model.bushing, specimens, knowledge.model.effects),
+        specimens=specimens,
         settings=simulation_settings(planned, knowledge.noise),
         model=knowledge.model,
         base=BASE,
@@ -64,6 +64,6 @@ def campaign_toml(knowledge: Knowledge, planned: Sequence[Test]) -> str:
         radian=Unit("rad", 1.0),
         hertz=Unit("Hz", 1.0),
         qualified_name=qualified_name,
-        place_lines=place_lines,
+        specimen_lines=specimen_lines,
         toml_value=toml_value,
     )

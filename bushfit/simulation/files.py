@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from typing_extensions import TypedDict
 
-from bushfit.campaign.toml import body_lines, table_lines, toml_value
+from bushfit.campaign.toml import specimen_lines, toml_value
 from bushfit.effects import ORIGINS
 from bushfit.errors import quote_path
 from bushfit.geometry import STRAINING, Direction, Display, Place, Unit, strain_factor_of_files
@@ -41,7 +41,7 @@ def to_files(simulated: Simulated, form: Form = "csv", effects: Collection[str] 
     Args:
         simulated: simulated campaign.
         form: file format of the tables.
-        effects: effects that a fit of the tests has, as of `body_lines`.
+        effects: effects that a fit of the tests has, such as the stiffness factor of a bushing.
 
     Returns:
         Content by file name: tables of the tests, `campaign.toml`, and the true model in `truth.json`. Comments in
@@ -57,13 +57,15 @@ def to_files(simulated: Simulated, form: Form = "csv", effects: Collection[str] 
         Path(__file__).with_name("campaign.toml.jinja"),
         plan=simulated.plan,
         laws=sorted({Path(origin.file).resolve().as_posix() for origin in origins if origin.file}),
-        body=body_lines(simulated.truth.bushing, simulated.specimens, effects),
+        bushing=simulated.truth.bushing,
+        specimens=simulated.specimens,
+        effects=effects,
         tests=[(kind, getattr(simulated, kind)) for kind in ("loops", "sweeps", "validation")],
         resonances=simulated.resonances,
         directions=list(Direction),
         ending=ending(form),
         quoted=lambda text: quote_path(Path(str(text))),
-        table_lines=table_lines,
+        specimen_lines=specimen_lines,
         toml_value=toml_value,
     )
     return {
