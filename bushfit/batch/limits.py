@@ -159,19 +159,21 @@ class Limits:
     guard: Annotated[bool, Field(strict=True)] = False
 
     def __post_init__(self) -> None:
-        names = [f"{STIFFNESS} {bounds.at}" for bounds in self.stiffness]
-        names += [f"{LOSS_FACTOR} {bounds.at}" for bounds in self.loss_factor]
-        for name, count in Counter(names).items():
+        for name, count in Counter(name for name, _ in self.at_points).items():
             if count > 1:
                 problem = CampaignError(f"{count} tables for one point", found=name, hint="put them in one table")
                 raise ValueError(problem)
 
     @property
+    def at_points(self) -> list[tuple[str, StiffnessBounds | LossFactorBounds]]:
+        """Name of the quantity, such as "stiffness axial 25 Hz 0.1 mm", and limits, of each operating point."""
+        tables = (STIFFNESS, self.stiffness), (LOSS_FACTOR, self.loss_factor)
+        return [(f"{name} {bounds.at}", bounds) for name, table in tables for bounds in table]
+
+    @property
     def bounds(self) -> dict[str, Bounds]:
         """All limits of the file by the name of the quantity, such as "stiffness axial 25 Hz 0.1 mm"."""
-        bounds: dict[str, Bounds] = {**self.parameters}
-        bounds |= {f"{STIFFNESS} {stiffness.at}": stiffness for stiffness in self.stiffness}
-        bounds |= {f"{LOSS_FACTOR} {loss_factor.at}": loss_factor for loss_factor in self.loss_factor}
+        bounds: dict[str, Bounds] = {**self.parameters, **dict(self.at_points)}
         largest = {quantity.name: getattr(self, key) for key, quantity in FIT_QUALITY.items()}
         return bounds | {name: Bounds(max=limit) for name, limit in largest.items() if limit is not None}
 

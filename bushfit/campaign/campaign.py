@@ -196,9 +196,8 @@ def _check_places(content: CampaignFile, specimens: Sequence[Specimen]) -> None:
     with error_location(place="predict.directions"):
         for name in content.predict.directions or ():
             get_places(name, specimens)
-    simulated = content.simulate.effects if content.simulate else {}
-    simulated_names = [f"{effect}.{name}" for effect, table in simulated.items() for name in table]
-    for name in (*content.fit.effects, *content.fit.parameters, *simulated_names):
+    simulated = content.simulate.effect_parameters if content.simulate else {}
+    for name in (*content.fit.effects, *content.fit.parameters, *simulated):
         if place := place_suffix(name):
             with error_location(place=name):
                 get_places(place, specimens)
@@ -234,14 +233,10 @@ def model_of(campaign: Campaign) -> Model:
             found="no " + ", ".join(missing),
             expected="all of " + ", ".join(FIVE),
         )
-    effects = campaign.simulate.effects
-    effect_parameters = {
-        f"{effect}.{name}": value for effect, table in effects.items() for name, value in table.items()
-    }
     with error_location(campaign.path):
-        names = with_base(dict.fromkeys(map(effect_name_of, effect_parameters)))
+        names = with_base(dict.fromkeys(map(effect_name_of, campaign.simulate.effect_parameters)))
         used = {name: value for name, value in values.items() if effect_name_of(name) in names}
-        return Model(campaign.bushing, names, {**used, **effect_parameters})
+        return Model(campaign.bushing, names, {**used, **campaign.simulate.effect_parameters})
 
 
 def refuse_tests(paths: Sequence[Path]) -> None:
@@ -328,20 +323,19 @@ def _test_names(tests: Sequence[LoopFile | SweepFile]) -> list[str]:
     contains several tests, sheet, temperature, direction, specimen number, preload and selected rows are
     added.
     """
-    keys = ("direction", "specimen_number", "preload")
-    stems, values = Counter(Path(test.file).stem for test in tests), defaultdict[str, list[tuple[Any, ...]]](list)
+    stems, of_file, names = Counter(Path(test.file).stem for test in tests), defaultdict[str, list[Any]](list), []
     for test in tests:
-        values[test.file].append(tuple(getattr(test, key) for key in keys))
+        of_file[test.file].append(test)
+    keys = ("direction", "specimen_number", "preload")
     differing = {
-        file: [key for key, column in zip(keys, zip(*rows, strict=True), strict=True) if len(set(column)) > 1]
-        for file, rows in values.items()
+        file: [key for key in keys if len({getattr(test, key) for test in listed}) > 1]
+        for file, listed in of_file.items()
     }
-    names = []
     for test in tests:
         stem = Path(test.file).stem
         temperature = None if test.temperature is None else f"{test.temperature - CELSIUS:.4g} degC"
         distinguishing = (getattr(test, key) for key in differing[test.file])
         parts = (stem, test.sheet, temperature, *distinguishing, *test.rows.values())
-        is_shared = len(values[test.file]) > 1
+        is_shared = len(of_file[test.file]) > 1
         names.append(" ".join(filter(None, parts)) if is_shared else test.file if stems[stem] > 1 else stem)
     return names

@@ -223,3 +223,8 @@ class SimulateSettings:
     sweeps: tuple[SimulatedSweep, ...] = ()
     resonances: tuple[SimulatedResonance, ...] = ()
     validation: tuple[SimulatedRecord, ...] = ()
+
+    @property
+    def effect_parameters(self) -> dict[str, float]:
+        """Values of the parameters of the added effects [SI], by qualified name such as "inertia.mass"."""
+        return {f"{effect}.{name}": value for effect, table in self.effects.items() for name, value in table.items()}

@@ -95,7 +95,7 @@ def command(
     with error_location(place="--at"):
         points = [*listed.points, *map(parse_point, options["operating_points"])]
     if judged_by:
-        points += [*(limit.at for limit in judged_by.stiffness), *(limit.at for limit in judged_by.loss_factor)]
+        points += [limit.at for _, limit in judged_by.at_points]
     pictures = options["plots"] and output.formats.pictures
     formats = replace(output.formats, tables=options["tables"], pictures=pictures, pages=options["reports"])
     folder = output.folder(listed.title)

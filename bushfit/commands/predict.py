@@ -10,7 +10,7 @@ from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.session import measured_session
 from bushfit.caveat import Caveat
 from bushfit.commands.loading import HasResult, as_result
-from bushfit.commands.predicted import PredictionOutput, prediction_files
+from bushfit.commands.predicted import PredictionOutput
 from bushfit.effects import Level
 from bushfit.effects.contract import RubberConditions
 from bushfit.effects.temperature import REFERENCE
@@ -113,11 +113,7 @@ def predict(
     predictions, resonances, curves = list[Prediction](), list[PredictedResonance](), list[StaticCurve]()
     loads = [(place, preload) for place in places for preload in requested_preloads(result, place, preloads)]
     for place, preload in loads:
-        drawn = [
-            sweep
-            for sweep in compared_sweeps
-            if sweep.direction == place and (preload is None or preload.equals(sweep.test.preload))
-        ]
+        drawn = [sweep for sweep in compared_sweeps if preload is None or preload.equals(sweep.test.preload)]
         prediction = predict_stiffness(
             result,
             place,
@@ -147,8 +143,7 @@ def predict(
                 expected="a model with frequency-dependent stiffness, for example with a springpot",
             )
     notes = (*notes, *(note.about(sweep.name) for sweep in measured for note in sweep.notes))
-    output = PredictionOutput(result, predictions, measured, notes, resonances, maxwell, curves)
-    return replace(output, files=prediction_files(output, wide=wide))
+    return PredictionOutput(result, predictions, measured, notes, resonances, maxwell, curves, wide)
 
 
 def check_temperature(result: Result, temperature: float | None) -> None:

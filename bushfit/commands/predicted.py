@@ -67,7 +67,7 @@ class PredictionOutput:
         resonances: resonance of a mass for each direction or specimen; empty without a mass.
         arms: Maxwell arms of each part of the model; empty unless requested.
         static: static curve of each direction or specimen; empty unless requested.
-        files: tables and figures.
+        wide: True to add tables with one column per amplitude.
     """
 
     result: Result
@@ -77,7 +77,7 @@ class PredictionOutput:
     resonances: Sequence[PredictedResonance] = ()
     arms: Sequence[Arms] = ()
     static: Sequence[StaticCurve] = ()
-    files: Sequence[ResultFile] = ()
+    wide: bool = False
 
     def __repr__(self) -> str:
         places = ", ".join(dict.fromkeys(str(prediction.direction) for prediction in self.predictions))
@@ -133,57 +133,49 @@ class PredictionOutput:
         """Expected error of |K| (relative) and loss factor (absolute) in each direction, from the measured sweeps."""
         return expected_errors(self.result.model, *self.measured_by_fit)
 
+    @cached_property
+    def files(self) -> list[ResultFile]:
+        """Tables and figures, each with the function that makes it."""
+        result, by_place = self.result, by_direction(self.predictions)
+        places = [predictions[0].direction for predictions in by_place]
+        names, (fitted, unfitted) = place_names(places), self.measured_by_fit
+        tabled = partial(tables.sweeps_table, result.model, [*fitted, *unfitted])
+        use = ["yes"] * sum(sweep.frequency.size for sweep in fitted)
+        use += ["no"] * sum(sweep.frequency.size for sweep in unfitted)
+        measured = ResultFile("measured", "table", lambda: tabled().assign(fitted=use))
 
-def prediction_files(output: PredictionOutput, *, wide: bool) -> list[ResultFile]:
-    """Tables and figures of a prediction.
+        def draw(prediction: Prediction) -> Figure:
+            """Draw a prediction with the measured sweeps of its direction, and with the warnings below the figure."""
+            place = prediction.direction
+            title = prediction.add_conditions(result.name if isinstance(place, Direction) else str(place))
+            note = plots.style.warnings_note(warnings_of(result, [], (*prediction.warnings, *self.notes)))
+            table = measured.content() if self.measured else None
+            return plots.prediction.prediction_figure(result, prediction, table, title, note)
 
-    Args:
-        output: the prediction.
-        wide: True to add tables with one column per amplitude.
-
-    Returns:
-        Files without folder and extension, each with the function that makes its table or figure.
-    """
-    result, by_place = output.result, by_direction(output.predictions)
-    places = [predictions[0].direction for predictions in by_place]
-    names, (fitted, unfitted) = place_names(places), output.measured_by_fit
-    tabled = partial(tables.sweeps_table, result.model, [*fitted, *unfitted])
-    use = ["yes"] * sum(sweep.frequency.size for sweep in fitted)
-    use += ["no"] * sum(sweep.frequency.size for sweep in unfitted)
-    measured = ResultFile("measured", "table", lambda: tabled().assign(fitted=use))
-
-    def draw(prediction: Prediction) -> Figure:
-        """Draw a prediction with the measured sweeps of its direction, and with the warnings below the figure."""
-        place = prediction.direction
-        title = prediction.add_conditions(result.name if isinstance(place, Direction) else str(place))
-        note = plots.style.warnings_note(warnings_of(result, [], (*prediction.warnings, *output.notes)))
-        table = measured.content() if output.measured else None
-        return plots.prediction.prediction_figure(result, prediction, table, title, note)
-
-    files = list[ResultFile]()
-    for name, predictions in zip(names, by_place, strict=True):
-        table = partial(joined_table, prediction_table, predictions)
-        files += [ResultFile(name, "table", table), ResultFile(name, "figure", partial(draw, predictions[0]))]
-        if len(predictions) > 1:
-            over_preload = partial(plots.preload.preload_figure, result, predictions, result.name)
-            files.append(ResultFile(f"{name}_preload", "figure", over_preload))
-    if output.arms:
-        files.append(ResultFile("arms", "table", partial(tables.arms_table, result.model, output.arms, places)))
-    suffixes: Sequence[tuple[str, Callable[[Any], pd.DataFrame], Sequence[Any]]] = [
-        ("wide", tables.wide_table, output.predictions if wide else ()),
-        ("static", partial(joined_table, tables.static_table), by_direction(output.static)),
-        ("resonance", tables.predicted_resonance_table, output.resonances),
-    ]
-    for suffix, make, parts in suffixes:
-        for name, part in zip(names, parts, strict=False):
-            stem = f"{name}_{suffix}"
-            while stem in names:  # of a specimen
-                stem += "_"
-            files.append(ResultFile(stem, "table", partial(make, part)))
-            if suffix == "static":
-                title = f"{result.name}: {part[0].label if len(part) == 1 else part[0].direction}, static curve"
-                files.append(ResultFile(stem, "figure", partial(plots.prediction.static_figure, part, title)))
-    return [*files, measured] if output.measured else files
+        files = list[ResultFile]()
+        for name, predictions in zip(names, by_place, strict=True):
+            table = partial(joined_table, prediction_table, predictions)
+            files += [ResultFile(name, "table", table), ResultFile(name, "figure", partial(draw, predictions[0]))]
+            if len(predictions) > 1:
+                over_preload = partial(plots.preload.preload_figure, result, predictions, result.name)
+                files.append(ResultFile(f"{name}_preload", "figure", over_preload))
+        if self.arms:
+            files.append(ResultFile("arms", "table", partial(tables.arms_table, result.model, self.arms, places)))
+        suffixes: Sequence[tuple[str, Callable[[Any], pd.DataFrame], Sequence[Any]]] = [
+            ("wide", tables.wide_table, self.predictions if self.wide else ()),
+            ("static", partial(joined_table, tables.static_table), by_direction(self.static)),
+            ("resonance", tables.predicted_resonance_table, self.resonances),
+        ]
+        for suffix, make, parts in suffixes:
+            for name, part in zip(names, parts, strict=False):
+                stem = f"{name}_{suffix}"
+                while stem in names:  # of a specimen
+                    stem += "_"
+                files.append(ResultFile(stem, "table", partial(make, part)))
+                if suffix == "static":
+                    title = f"{result.name}: {part[0].label if len(part) == 1 else part[0].direction}, static curve"
+                    files.append(ResultFile(stem, "figure", partial(plots.prediction.static_figure, part, title)))
+        return [*files, measured] if self.measured else files
 
 
 def by_direction(parts: Sequence[Part]) -> list[list[Part]]:

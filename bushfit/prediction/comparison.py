@@ -144,9 +144,7 @@ class Comparison:
         sentences = []
         for contrast in self.contrasts:
             stiffness, loss = self.widened(contrast.stiffness), self.widened(contrast.loss_factor)
-            value, low, high = (
-                100.0 * relative_difference(x) for x in (stiffness.value, stiffness.low, stiffness.high)
-            )
+            value, low, high = 100.0 * relative_difference(stiffness.ends)
             percent = Band(value, low, high, stiffness.root)
             quantity, label = contrast.place.motion.words[2], contrast.reference.label
             differences = _describe_difference(percent, " %", contrast)
