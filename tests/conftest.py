@@ -12,6 +12,7 @@ import pytest
 from commandline import Run, Shared, typing
 from fits import joint_fit
 from hypothesis import HealthCheck, settings
+from paper import CMP_15961, TABLE_1
 
 from bushfit.campaign.campaign import Campaign, load_campaign
 from bushfit.effects import BASE
@@ -28,8 +29,6 @@ for name, tries in (("commit", 10), ("full", 50)):
 settings.load_profile("commit")
 
 ROOT = Path(__file__).parents[1]
-TABLE_1 = {"mu": 1.09e6, "m": 2.0e5, "alpha": 0.24, "sigma_fmax": 1.46e4, "eps_half": 1.3e-2}
-CMP_15961 = Bushing("CMP 15 961", 0.010, 0.018, 0.034)
 
 
 @pytest.fixture(scope="session")

@@ -1,13 +1,10 @@
 """`bushfit batch` as typed: rows equal single commands to the last digit, and nothing that is done is done again."""
 
 import json
-import math
 import os
 import signal
 from functools import partial
 
-import numpy as np
-import pandas as pd
 import pytest
 from junitparser import JUnitXml
 from trees import PATTERN, rows, tree
@@ -41,32 +38,6 @@ def test_a_row_is_the_single_command_to_the_last_digit(typed, shop):
     assert tree(shop / "all/bushings/c") == single | joint
 
 
-def test_the_table_is_in_order_with_units_and_the_numbers_of_the_models(typed, shop):
-    done = typed("batch", PATTERN, "-o", "all", "--at", "axial 25 Hz 0.1 mm", "--at", "torsion 10 Hz 1 deg", "--json")
-    table = pd.read_csv(shop / "all/batch.csv")
-    assert list(table["name"]) == [f"b{n}" for n in range(5)]
-    models = [json.loads((shop / "all" / folder / "model.json").read_text()) for folder in table["folder"]]
-    mu, friction = ([model["parameters"][name] for model in models] for name in ("mu", "sigma_fmax"))
-    known = np.array([parameter.get("stderr") is not None for parameter in mu])
-    assert known.sum() >= 3
-    assert all("mu" in text for text in table["at bound"][~known])
-    for header, values in {
-        "mu [MPa]": [1e-6 * parameter["value"] for parameter in mu],
-        "mu [MPa], std error": [1e-6 * (parameter.get("stderr") or math.nan) for parameter in mu],
-        "mu [MPa], low": [1e-6 * (parameter.get("ci95") or [math.nan])[0] for parameter in mu],
-        "sigma_fmax [kPa]": [1e-3 * parameter["value"] for parameter in friction],
-        "NRMSE [%]": [100.0 * model["fit"]["nrmse"] for model in models],
-    }.items():
-        np.testing.assert_allclose(table[header], values, rtol=1e-6)
-    low, value, high = (table[f"stiffness axial 25 Hz 0.1 mm [N/mm]{end}"] for end in (", low", "", ", high"))
-    assert ((low < value) & (value < high) & (table["loss factor torsion 10 Hz 1 deg [-]"] > 0)).all()
-    summary = json.loads(done.stdout)
-    assert (summary["rows"], summary["done"], summary["failed"]) == (5, 5, [])
-    assert summary["quantities"]["mu [MPa]"]["median"] == pytest.approx(table["mu [MPa]"].median(), rel=1e-6)
-    assert summary["headline"] == "5 parts evaluated"
-    assert (shop / "all/batch.png").read_bytes().startswith(b"\x89PNG")
-
-
 def test_a_bad_row_costs_that_row(typed, shop):
     """A test that is none, a missing file, a campaign of gigabytes, a model that is a pipe, a device or missing: one
     clear error a row, at once."""
@@ -98,22 +69,6 @@ def test_a_bad_row_costs_that_row(typed, shop):
     assert (suite.tests, suite.errors, suite.failures) == (8, 7, 0)
     assert "sweep_axial.csv" in list(suite)[1].result[0].text
     typed("batch", "m.csv", "-o", "two", "--scheduler", "", status=2)
-
-
-def test_limits_decide_the_exit_status_and_are_named(typed, shop):
-    typed("batch", PATTERN, "-o", "all", "--no-plots", "-q")
-    middle = sorted(float(row["mu [MPa]"]) for row in rows(shop / "all"))[2]
-    (shop / "limits.toml").write_text(f'[parameters.mu]\nmax = "{1.1 * middle} MPa"\n')
-    more = ("--resume", "--limits", "limits.toml", "--junit", "r.xml")
-    done = typed("batch", PATTERN, "-o", "all", "--no-plots", *more, status=1)
-    table = rows(shop / "all")
-    over = [float(row["mu [MPa]"]) > 1.1 * middle for row in table]
-    assert 0 < sum(over) < 5
-    assert f"batch: {sum(over)} of 5 parts fail" in done.text
-    assert ["fail" in row["limits"] for row in table] == over
-    assert all(row["missed limits"].startswith("mu ") == bad for row, bad in zip(table, over, strict=True))
-    (suite,) = JUnitXml.fromfile(str(shop / "r.xml"))
-    assert [bool(case.result) for case in suite] == over
 
 
 def test_a_parameter_on_a_bound_of_its_fit_passes_on_condition_and_is_named(typed, shop):

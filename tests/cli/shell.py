@@ -9,7 +9,6 @@ from commandline import Done
 #: The paper's tests, in the folder `work`.
 CAMPAIGN = "configs/cmp_15961.toml"
 GEOMETRY = ("--inner-radius", "10 mm", "--outer-radius", "18 mm", "--length", "34 mm")
-BUSHING = '[bushing]\nname = "B"\ninner_radius = "10 mm"\nouter_radius = "18 mm"\nlength = "34 mm"\n'
 
 
 def refused(done: Done, folder: Path, *words: str) -> None:

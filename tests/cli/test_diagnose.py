@@ -56,3 +56,9 @@ def test_its_own_model_is_consistent_and_predicts_without_the_rig(root, found, t
     assert json.loads(again.stdout)["verdict"] == "consistent"
     assert document(tmp_path / "again/model.json")["effects"] == [*BASE, "inertia"]
     assert "inertia" in bushfit("predict", model, "-o", tmp_path / "predicted", "--no-plots").stderr
+
+
+def test_without_names_each_law_is_a_family(bushfit, tmp_path, monkeypatch):
+    monkeypatch.setattr("bushfit.diagnosis.families.known_families", lambda *_: ("sliders",))
+    done = bushfit("compare", "configs/cmp_15961.toml", "-o", tmp_path / "x", "--json", "--no-plots", "--families")
+    assert [family["name"] for family in json.loads(done.stdout)["families"]] == ["paper", "sliders"]

@@ -261,3 +261,16 @@ def test_tests_of_two_specimens_or_preloads_are_not_fitted_in_silence(bushfit, o
     campaign.write_text("[[".join([head, loop, *stated]), encoding="utf-8")
     done = bushfit("fit", campaign, "-o", own / "x", "--no-plots")
     assert f"the tests are {words} 0 mm (sweep_axial), 5 mm (sweep_radial)" in done.stderr
+
+
+def test_a_sheet_of_a_workbook(typed, root, tmp_path):
+    with pd.ExcelWriter(tmp_path / "tests axial.xlsx") as book:
+        for name, file in (("loop", "loop_axial_1"), ("sweep", "sweep_radial")):
+            pd.read_csv(root / f"data/arm_bushing/{file}.csv").to_excel(book, sheet_name=name, index=False)
+    for sheet, kind in (("loop", "loops"), ("sweep", "sweeps")):
+        done = typed("inspect", "tests axial.xlsx", "--sheet", sheet, "--no-plots")
+        assert f"sheet {sheet}" in done.stderr
+        assert tomllib.loads(done.stdout)[kind][0]["sheet"] == sheet
+    typed("init", "tests axial.xlsx", *GEOMETRY, "-o", "x")
+    campaign = load_campaign(tmp_path / "x/campaign.toml")
+    assert [test.name for test in (*campaign.loops, *campaign.sweeps)] == ["tests axial loop", "tests axial sweep"]

@@ -11,8 +11,9 @@ import numpy as np
 import pandas as pd
 import pytest
 from commandline import typing
+from paper import BUSHING
 from scipy.io import savemat
-from shell import BUSHING, GEOMETRY, document, refused, values
+from shell import GEOMETRY, document, refused, values
 
 FILES = Path(__file__).parents[1] / "files" / "recordings"
 #: The endings of the loop, the axial and the radial sweep of a campaign, so that each format has both kinds of test.

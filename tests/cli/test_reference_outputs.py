@@ -9,6 +9,7 @@ from pathlib import Path
 from string import Template
 from unittest import mock
 
+import numpy as np
 import pandas as pd
 import pytest
 from commandline import call, state
@@ -19,14 +20,33 @@ from tries import some
 from bushfit.commands.schema import DESCRIBED
 
 CASES = tomllib.loads((Path(__file__).with_suffix("") / "commands.toml").read_text(encoding="utf-8"))
-PARTS, CAMPAIGNS = CASES.pop("parts"), CASES.pop("campaigns")
+PARTS, CAMPAIGNS, TEXTS = (CASES.pop(key) for key in ("parts", "campaigns", "texts"))
 
 
-def change(folder: Path, file: str, column: str, rows: str, factor: str) -> None:
-    """Multiply a column of a CSV by a factor in the rows of a pandas query."""
+def change(folder: Path, file: str, column: str, rows: str, expression: str) -> None:
+    """Change a column of a CSV in the rows of a pandas query to a NumPy expression of its values x and the table t."""
+    t = pd.read_csv(folder / file)
+    index = t.query(rows).index
+    t.loc[index, column] = eval(expression, {**vars(np), "x": t.loc[index, column], "t": t.loc[index]})
+    t.to_csv(folder / file, index=False)
+
+
+def drop(folder: Path, file: str, rows: str) -> None:
+    """Remove the rows of a pandas query from a CSV."""
     table = pd.read_csv(folder / file)
-    table.loc[table.query(rows).index, column] *= float(factor)
-    table.to_csv(folder / file, index=False)
+    table.drop(table.query(rows).index).to_csv(folder / file, index=False)
+
+
+def tabulate(folder: Path, file: str, numbers: str, *columns: str) -> None:
+    """Write a CSV of columns `header=expression` of row numbers n, themselves an expression; others are lines above."""
+    pairs = [column.rpartition("=") for column in columns]
+    n = eval(numbers, vars(np))
+    table = pd.DataFrame({header: eval(text, {**vars(np), "n": n}) for header, _, text in pairs if header})
+    lines = "".join(f"{text}\n" for header, _, text in pairs if not header)
+    (folder / file).write_text(lines + table.to_csv(index=False, float_format="%.9g"), encoding="utf-8")
+
+
+EDITS = {"change": change, "drop": drop, "tabulate": tabulate}
 
 
 def assert_described(text: str, source: str) -> None:
@@ -40,12 +60,13 @@ def transcript(folder: Path, commands: str) -> Iterator[str]:
     for command in commands.strip().splitlines():
         yield f"$ bushfit {command}"
         before = state(folder)
-        if command.startswith("change "):
-            change(folder, *shlex.split(command)[1:])
+        name, *arguments = shlex.split(command)
+        if name in EDITS:
+            EDITS[name](folder, *arguments)
             continue
-        done = call(folder, *shlex.split(command))
+        done = call(folder, name, *arguments)
         if "--json" in command and done.stdout:
-            assert_described(done.stdout, rf"--json of ([\w ]*{command.split()[0]}\b|the {command[:3]}s)")
+            assert_described(done.stdout, rf"--json of ([\w ]*{name}\b|the {name[:3]}s)")
         yield from (f"exit status {done.returncode}", *printed_lines(done.stdout), "errors:", *text_lines(done.stderr))
         for path in sorted(file for file, _ in state(folder).items() - before.items() if not file.name.startswith(".")):
             if path.suffix == ".json":
@@ -59,6 +80,8 @@ def test_commands_print_and_write_what_the_references_hold(name, root, tmp_path,
         (tmp_path / Path(folder).name).symlink_to(root / folder)
     for campaign, text in CAMPAIGNS.items():
         (tmp_path / f"{campaign}.toml").write_text(Template(text).substitute(PARTS), encoding="utf-8")
+    for file, text in TEXTS.items():
+        (tmp_path / file).write_text(text, encoding="utf-8")
     with mock.patch("bushfit.report.plots.style.to_image", describe_figure):
         text = "\n".join(transcript(tmp_path, CASES[name]["commands"])) + "\n"
     text = text.replace(str(tmp_path), "FOLDER").replace(str(root), "ROOT")

@@ -3,42 +3,45 @@
 import json
 import shutil
 
+import numpy as np
 import pandas as pd
 import pytest
-from shell import BUSHING, GEOMETRY, document, names, values
+from paper import BUSHING, PARAMETERS
+from shell import GEOMETRY
 
 from bushfit.geometry import Direction
 from bushfit.reading.stated import SweepFile
 from bushfit.reading.sweeps import read_sweep
 
 RECORD = "data/cmp_15961_raw/stepped_sine_axial.csv"
-
-
-def test_simulate_writes_a_campaign_that_run_takes(bushfit, tmp_path):
-    for folder, seed in (("one", 7), ("same", 7), ("other", 8)):
-        bushfit("simulate", "model/model.json", "--seed", seed, "--noise", "0.5 %", "-o", tmp_path / folder)
-    one, same, other = ((tmp_path / name / "sweep_axial.csv").read_text() for name in ("one", "same", "other"))
-    assert one == same != other
-    files = {"campaign.toml", "truth.json", "loop_axial_1.csv", "sweep_axial.csv", "sweep_radial.csv"}
-    assert names(tmp_path / "one") == files
-    fitted = values(bushfit("fit", tmp_path / "one/campaign.toml", "-o", tmp_path / "fit", "--no-plots", "--json"))
-    truth = document(tmp_path / "one/truth.json")["parameters"]
-    assert fitted == pytest.approx({name: truth[name]["value"] for name in fitted}, rel=0.06)
-    bushfit("simulate", "model/model.json", "--effect", "stiffness_factor.radial=1.1", "-o", tmp_path / "sim")
-    assert document(tmp_path / "sim/truth.json")["parameters"]["stiffness_factor.radial"]["value"] == 1.1
+MOTIONS = f"""{BUSHING}{PARAMETERS}
+[simulate]
+seed = 3
+[[simulate.validation]]
+direction = "axial"
+motion = "random"
+frequencies = ["2 Hz", "60 Hz"]
+amplitudes = ["1 mm", "1 mm"]
+rms = "0.05 mm"
+duration = "3 s"
+[[simulate.validation]]
+direction = "axial"
+motion = "sines"
+frequencies = ["2 Hz", "50 Hz"]
+amplitudes = ["0.2 mm", "0.05 mm"]
+duration = "2 s"
+[[simulate.validation]]
+direction = "axial"
+motion = "road"
+frequencies = ["1 Hz", "40 Hz"]
+rms = "0.1 mm"
+duration = "4 s"
+"""
 
 
 def test_a_raw_record_becomes_a_sweep_that_fits(typed, root, tmp_path, paper_model, table_1):
     done = typed("reduce", root / RECORD, "-o", "x", "--json", "--cycles", "4")
-    assert names(tmp_path / "x") == {"sweep.csv", "reduce.png"}
-    assert "15 points found" in done.stderr
-    assert "10-155 605.5-693.3 0.106-0.141 0.06 0.93" in " ".join(done.stderr.split()), "noise, distortion in per cent"
-    document, table = json.loads(done.stdout), pd.read_csv(tmp_path / "x/sweep.csv")
-    assert document["direction"] == "axial"
-    assert list(table) == list(document["points"])
-    assert list(table)[:3] == ["frequency [Hz]", "amplitude [mm]", "amplitude reached [mm]"]
-    assert (table["force distortion [-]"] > 0.005).all()
-    assert (table["cycles used"] >= 4).all()
+    assert (pd.read_csv(tmp_path / "x/sweep.csv")["cycles used"] >= 4).all()
     sweep = read_sweep(tmp_path / "x/sweep.csv", Direction.AXIAL, SweepFile(file="sweep.csv"))
     off = sweep.stiffness / paper_model.stiffness(Direction.AXIAL, sweep.frequency, sweep.amplitude_reached) - 1.0
     assert abs(off).max() < 3e-3
@@ -56,3 +59,22 @@ def test_a_raw_record_becomes_a_sweep_that_fits(typed, root, tmp_path, paper_mod
         off = entry["value"] / table_1[name] - 1.0
         assert abs(off) < 0.03
         assert abs(off) * table_1[name] < 3.0 * entry["stderr"]
+
+
+def test_simulated_motions_have_the_stated_spectra(typed, tmp_path):
+    (tmp_path / "plan.toml").write_text(MOTIONS)
+    typed("simulate", "plan.toml", "-o", "tests")
+    random, sines, road = (pd.read_csv(tmp_path / f"tests/record_axial_{number}.csv") for number in (1, 2, 3))
+    for table, rms, duration in ((random, 0.05, 3.0), (road, 0.1, 4.0)):
+        assert table["displacement [mm]"].std() == pytest.approx(rms, rel=0.05)
+        assert table["time [s]"].iloc[-1] == pytest.approx(duration, rel=0.01)
+        assert table["displacement [mm]"].iloc[0] == 0.0
+    settled = sines[sines["time [s]"] >= 1.0]
+    step = sines["time [s]"][1]
+    size = 2.0 * np.abs(np.fft.rfft(settled["displacement [mm]"][: round(1.0 / step)])) * step
+    assert size[[2, 50]] == pytest.approx([0.2, 0.05], rel=0.01)
+    for table, ratio in ((random, 1.0), (road, 3.0)):  # of the spectra from 5 to 10 and from 15 to 30 Hz
+        spectrum = np.abs(np.fft.rfft(table["displacement [mm]"])) ** 2
+        frequency = np.fft.rfftfreq(len(table), table["time [s]"][1])
+        low, high = (spectrum[(frequency > end) & (frequency < 2.0 * end)].mean() for end in (5.0, 15.0))
+        assert np.sqrt(low / high) == pytest.approx(ratio, rel=0.25)

@@ -14,8 +14,9 @@ import numpy as np
 import pytest
 from bombs import far_apart, workbook
 from commandline import Done, call
+from paper import BUSHING
 from references import check, text_lines
-from shell import BUSHING, refused
+from shell import refused
 from spoiled import FILES, ROWS, Spoiled
 
 from bushfit.cli import cli

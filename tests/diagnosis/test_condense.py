@@ -6,23 +6,21 @@ from typing import Any
 
 import numpy as np
 import pytest
+from paper import CMP_15961, TABLE_1
 from rigged import LEVELS
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.condense import shorten_tests
 from bushfit.diagnosis.workflow import diagnose
+from bushfit.effects import BASE
 from bushfit.effects.contract import Array
 from bushfit.fitting.prepared_campaign import PreparedCampaign
-from bushfit.geometry import Bushing, Direction
-from bushfit.model.model import FIVE, Model
+from bushfit.geometry import Direction
+from bushfit.model.model import Model
 from bushfit.reading.measurement import Sweep
 
-PAPER = Model.with_defaults(
-    Bushing("paper's", 0.010, 0.018, 0.034),
-    ("elastic", "springpot", "friction"),
-    dict(zip(FIVE, (1.09e6, 0.2e6, 0.24, 14.6e3, 0.013), strict=True)),
-)
+PAPER = Model(CMP_15961, BASE, TABLE_1)
 POINTS = 900
 SCATTER = 0.01
 UP = np.geomspace(5.0, 60.0, 450)

@@ -5,21 +5,18 @@ import math
 import numpy as np
 import pytest
 import scipy.stats
+from paper import CMP_15961, TABLE_1
 
 from bushfit.effects import BASE, History, distributed_sliders, sliders
 from bushfit.effects.contract import RubberConditions
 from bushfit.effects.dead_zone import first_harmonic
 from bushfit.effects.temperature import log_shift
-from bushfit.geometry import Bushing, Direction
+from bushfit.geometry import Direction
 from bushfit.model.model import Model
 from bushfit.reading.preload import Preload
 from bushfit.units import CELSIUS
 
-PLAIN = Model(
-    Bushing("CMP 15 961", 0.010, 0.018, 0.034),
-    BASE,
-    {"mu": 1.09e6, "m": 2.0e5, "alpha": 0.24, "sigma_fmax": 1.46e4, "eps_half": 1.3e-2},
-)
+PLAIN = Model(CMP_15961, BASE, TABLE_1)
 #: Operating points [Hz] and [m].
 FREQUENCY = np.array([5.0, 55.0, 155.0])
 AMPLITUDE = np.array([1e-4, 2e-4, 5e-4])
@@ -27,7 +24,7 @@ AXIAL, RADIAL = (("axial", FREQUENCY, AMPLITUDE), ("radial", FREQUENCY, AMPLITUD
 LOOP = History.steady(5e-4 * np.cos(2.0 * np.pi * np.arange(512) / 512), 5.0)
 STARTED = History(5e-4 * np.sin(2.0 * np.pi * np.arange(20480) / 2048), 1.0 / (20.0 * 2048), False, 20.0)
 SLIDERS = {"sigma": 2.5e4, "e_s": 0.015, "spread": 1.3}
-VALUES = {"sigma_fmax": 1.46e4, "eps_half": 1.3e-2}
+VALUES = {name: TABLE_1[name] for name in ("sigma_fmax", "eps_half")}
 
 
 def added(name: str, model: Model = PLAIN, **values: float) -> Model:

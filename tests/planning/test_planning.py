@@ -1,11 +1,11 @@
 """A plan against what is worked out another way: full covariances, every choice there is, and fits."""
 
 from dataclasses import fields, replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from fits import joint_fit
+from paper import CMP_15961, TABLE_1
 
 from bushfit.campaign.campaign import load_campaign, model_of
 from bushfit.campaign.quantities import Compound
@@ -14,7 +14,7 @@ from bushfit.campaign.simulated import SimulatedLoop, SimulatedSweep
 from bushfit.effects.contract import Array
 from bushfit.fitting.preparation import MeasuredSweep, planned_loop, planned_sweep
 from bushfit.fitting.problem import FitProblem
-from bushfit.geometry import Bushing, Direction, Place, Specimen
+from bushfit.geometry import Direction, Place, Specimen
 from bushfit.model.covariance import Z95
 from bushfit.model.model import Model
 from bushfit.model.result import Result
@@ -23,7 +23,7 @@ from bushfit.planning.candidates import candidates
 from bushfit.planning.compound import gent_modulus, guess_parameters
 from bushfit.planning.contract import Aim, Knowledge, Noise, PlanRequest, Test, operating_points
 from bushfit.planning.information import CandidateGrid, ModelInformation, relative_slopes, rival_chi_squares
-from bushfit.planning.plan import Plan, describe_purpose, plan
+from bushfit.planning.plan import Plan, plan
 from bushfit.planning.search import PlanSearch
 from bushfit.simulation.measured import measure
 from bushfit.simulation.undisturbed import undisturbed
@@ -43,14 +43,12 @@ TESTS: tuple[Test, ...] = (*SWEEPS, SimulatedLoop(AXIAL, 1e-3, 0.1), SimulatedLo
 GRIDS = dict.fromkeys((AXIAL, RADIAL), (np.array(BAND), np.array([1e-4, 2e-4, 5e-4])))
 RIG = RigSettings(gain_error=0.005, phase_error=0.0044, max_force=5e3, max_frequency=200.0)
 WANTED = {AXIAL: (np.array([10.0, 50.0, 150.0]), np.array([2e-4, 5e-4]))}
-BUSHING = Bushing("guessed", 0.010, 0.018, 0.034)
-#: Table 1 of Garcia Tarrago et al. 2007; the compound is that of its section 2: 61 Shore A, 27 phr, natural rubber.
-TABLE_1 = {"mu": 1.09e6, "m": 2e5, "alpha": 0.24, "sigma_fmax": 14.6e3, "eps_half": 0.013}
 
 
 @pytest.fixture(scope="module")
 def known() -> Knowledge:
-    return replace(guess_parameters(Bushing("paper's", 0.010, 0.018, 0.034), Compound(61.0, 27.0)), noise=NOISE)
+    """The compound of section 2 of the paper: 61 Shore A, 27 phr, natural rubber."""
+    return replace(guess_parameters(CMP_15961, Compound(61.0, 27.0)), noise=NOISE)
 
 
 @pytest.fixture(scope="module")
@@ -175,17 +173,6 @@ def test_a_plan_is_better_than_the_standard_programme_and_errors_before_are_thos
         assert goal.half_width(covariance) == pytest.approx(relative.max(), rel=2e-3)
 
 
-def test_the_purpose_of_a_test_is_the_error_without_it():
-    search = SimpleNamespace(
-        counts=np.array([1, 2]),
-        request=SimpleNamespace(aim="parameters", parameters=("mu",)),
-        goals=(),
-        knowledge=SimpleNamespace(names=("mu",)),
-        error_covariance=lambda counts: np.array([[1.0 if counts.all() else 2.25]]),
-    )
-    assert describe_purpose(search, 1) == "mu: error 50 % larger without this run"
-
-
 @pytest.mark.parametrize(
     ("limit", "most"),
     [("max_force", 300.0), ("max_displacement", 3e-4), ("max_frequency", 60.0), ("max_velocity", 0.05)],
@@ -264,7 +251,7 @@ def test_gents_relation(shore, megapascal):
 
 def test_filler_amplifies_strain_and_makes_a_network():
     """50 phr over the paper's 27, by hand: X_0/X of Guth 1.511/2.093, and phi^3.5 of the shares 0.204 and 0.121."""
-    many, few = (guess_parameters(BUSHING, Compound(61, phr)).model.values for phr in (50, 27))
+    many, few = (guess_parameters(CMP_15961, Compound(61, phr)).model.values for phr in (50, 27))
     ratio = {name: many[name] / few[name] for name in few}
     assert ratio["eps_half"] == pytest.approx(0.722, rel=0.01)
     assert ratio["sigma_fmax"] / ratio["eps_half"] / ratio["mu"] == pytest.approx(4.41, rel=0.03)
@@ -272,10 +259,10 @@ def test_filler_amplifies_strain_and_makes_a_network():
 
 
 def test_the_guess_holds_the_papers_and_a_measured_rubber(root):
-    found = off(guess_parameters(BUSHING, Compound(61, 27)), TABLE_1)
+    found = off(guess_parameters(CMP_15961, Compound(61, 27)), TABLE_1)
     assert np.abs(found).max() < Z95
     # An EPDM of 70 Shore A whose filler nobody states; its strain sweeps alone, which the five parameters can meet.
     fitted = joint_fit(load_campaign(root / "configs/epdm_70.toml"), directions=["DMA"]).model
     for phr in (40.0, 50.0, 60.0):
-        found = off(guess_parameters(BUSHING, Compound(70, phr, "EPDM")), dict(fitted.values))
+        found = off(guess_parameters(CMP_15961, Compound(70, phr, "EPDM")), dict(fitted.values))
         assert np.abs(found).max() < Z95

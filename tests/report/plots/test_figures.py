@@ -8,28 +8,19 @@ import pytest
 from commandline import typing
 from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
+from paper import BUSHING, PARAMETERS
 from tries import some
 
 from bushfit.report.plots.style import fixed_settings
 
-CAMPAIGN = """
-[bushing]
-name = "A name that tells all that is known of the bushing and of its tests"
-inner_radius = "10 mm"
-outer_radius = "18 mm"
-length = "34 mm"
+CAMPAIGN = f"""
+{BUSHING.replace('"B"', '"A name that tells all that is known of the bushing and of its tests"')}
+{PARAMETERS}
 [simulate]
 noise = "1 %"
 [[simulate.sweeps]]
 direction = "axial"
 frequencies = {{ start = "5 Hz", stop = "155 Hz", step = "10 Hz" }}
-amplitudes = {}
-[simulate.parameters]
-mu = "1.09 MPa"
-m = "0.2 MPa*s^alpha"
-alpha = 0.24
-sigma_fmax = "14.6 kPa"
-eps_half = 0.013
 """
 #: A picture that is higher does not fit on three pages of A4 [inch].
 HIGHEST = 33.0
@@ -59,7 +50,7 @@ def test_levels_are_named_by_a_legend_or_a_colour_bar(tmp_path, count):
         return b""
 
     amplitudes = [f"{amplitude:.4g} mm" for amplitude in np.geomspace(0.02, 1.0, count)]
-    (tmp_path / "plan.toml").write_text(CAMPAIGN.format(amplitudes))
+    (tmp_path / "plan.toml").write_text(f"{CAMPAIGN}amplitudes = {amplitudes}\n")
     run, file = typing(tmp_path), "s/sweep_axial.csv"
     run("simulate", "plan.toml", "-o", "s")
     with mock.patch("bushfit.report.plots.style.to_image", keep):
