@@ -302,5 +302,5 @@ def test_a_function_of_the_library_uses_one_thread_and_can_be_pickled(monkeypatc
     with threadpool_limits(2):
         assert package.load_model() == {1}
         assert threads() == {2}
-    monkeypatch.delitem(vars(package), "load_model")
+    del vars(package)["load_model"]
     assert pickle.loads(pickle.dumps(package.fit)) is package.fit

@@ -5,14 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bushfit.campaign.campaign import load_campaign
 from bushfit.campaign.simulated import SimulatedLoop, SimulatedSweep, SimulateSettings
 from bushfit.effects import BASE, LIBRARY, History, get_effect, qualified_name
 from bushfit.geometry import Direction, Specimen
 from bushfit.model.model import Model
 from bushfit.simulation import rig
-from bushfit.simulation.files import to_files
-from bushfit.simulation.measured import measure, simulate
+from bushfit.simulation.measured import measure
 from bushfit.simulation.undisturbed import Undisturbed, undisturbed
 
 LOOP = SimulatedLoop(Direction.AXIAL, 1e-3, 0.1, cycles=2)
@@ -94,15 +92,6 @@ def test_gain_and_phase_errors_are_shared(clean, coupon, shared_by):
     assert np.std(factors.imag) == pytest.approx(0.02, rel=0.1)
     if of_level:
         assert abs(np.corrcoef(factors[:, :, 0, 0].real.T)[0, 1]) < 0.2
-
-
-def test_errors_of_levels_are_stated_in_the_campaign(paper_model, tmp_path):
-    sweep = SimulatedSweep(Direction.AXIAL, (1e-4,), (5.0, 15.0, 25.0))
-    plan = SimulateSettings(sweeps=(sweep,), level_gain_error=2e-3, level_phase_error=3e-3)
-    for name, content in to_files(simulate(paper_model, plan)).items():
-        (tmp_path / name).write_bytes(content)
-    rig = load_campaign(tmp_path / "campaign.toml").rig
-    assert (rig.gain_error, rig.phase_error) == pytest.approx((2e-3, 3e-3))
 
 
 def test_an_amplitude_sweep_has_the_stiffness_at_the_amplitudes_reached(coupon):
