@@ -35,6 +35,7 @@ def test_compare_writes_a_whole_page_and_its_folder_gives_the_same(compared, nam
     described = [value for tag, key, value in found.attributes if (tag, key) == ("svg", "aria-label")]
     assert len(described) == found.counts["svg"] == 1
     assert min(map(len, described)) > 40
+    assert ("<span><b>" in page) == (name == "two"), "significant differences alone are bold"
 
 
 @SLOW
