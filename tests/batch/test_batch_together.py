@@ -45,22 +45,6 @@ def test_a_part_that_differs_is_named_with_the_parameter_that_was_changed(made, 
     assert said.startswith(f"batch: {document['headline']}\n")
 
 
-def test_the_measured_curve_ends_the_table(made, table):
-    columns = list(table)
-    last = columns.index("warnings")
-    assert columns[last + 1 :][:4] == ["campaign name", "subgroup", "differs in", "poor fit"]
-    assert columns.index("mu [MPa]") < last
-    assert list(table["campaign name"]) == [f"SN {900 + number}" for number in range(COUNT)]
-    curve = [name for name in columns[last:] if name.startswith("measured stiffness axial ")]
-    assert len(curve) == 6
-    sweep = pd.read_csv(made / "part_03/sweep.csv")
-    at_point = sweep[(sweep["frequency [Hz]"] == 25) & (sweep["amplitude [mm]"] == 0.2)]
-    measured = table["measured stiffness axial 25 Hz 0.2 mm [N/mm]"]
-    assert measured[3] == pytest.approx(at_point["stiffness [N/mm]"].mean(), rel=1e-6)
-    deviation = np.exp(np.log(table[curve] / table[curve].median()).mean(axis=1)) - 1.0
-    assert np.allclose(table["measured stiffness above the median [%]"], 100.0 * deviation, atol=1e-3)
-
-
 def test_the_page_lists_a_warning_once_with_the_number_of_its_parts(made, document):
     page = html.unescape((made / "out/index.html").read_text(encoding="utf-8"))
     listed = page.partition('<ol class="warnings">')[2].partition("</ol>")[0].split("</li>")[:-1]

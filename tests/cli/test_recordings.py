@@ -46,16 +46,6 @@ def test_frequency_responses_of_uff_are_sweeps(own, units):
     assert fitted[0] == pytest.approx(fitted[1], rel=1e-3 if units == "at_nodes" else 1e-6), "dataset 55: six digits"
 
 
-def test_a_file_of_one_group_says_by_its_title_what_one_of_several_does(typed):
-    assert "from the name: amplitude 0.1 mm" in typed("inspect", FILES / "one_level.uff", "--no-plots").stderr
-
-
-def test_timestamps_become_seconds(typed):
-    assert (
-        "frequency: 0.1 Hz" in typed("inspect", FILES / "timestamps.parquet", "--direction=axial", "--no-plots").stderr
-    )
-
-
 #: Files that cannot be used, and what their error says.
 SPOILED: dict[str, tuple[str, ...]] = {
     "two_rates.mf4": ("no group holds such a table", '"at 100 Hz", "at 20 Hz"', "resample"),

@@ -38,12 +38,16 @@ def drop(folder: Path, file: str, rows: str) -> None:
 
 
 def tabulate(folder: Path, file: str, numbers: str, *columns: str) -> None:
-    """Write a CSV of columns `header=expression` of row numbers n, themselves an expression; others are lines above."""
+    """Write a CSV of columns `header=expression` of row numbers n, themselves an expression; others are lines above.
+
+    A file of the name +FILE is appended to FILE.
+    """
     pairs = [column.rpartition("=") for column in columns]
     n = eval(numbers, vars(np))
     table = pd.DataFrame({header: eval(text, {**vars(np), "n": n}) for header, _, text in pairs if header})
     lines = "".join(f"{text}\n" for header, _, text in pairs if not header)
-    (folder / file).write_text(lines + table.to_csv(index=False, float_format="%.9g"), encoding="utf-8")
+    with (folder / file.removeprefix("+")).open("a" if file.startswith("+") else "w", encoding="utf-8") as stream:
+        stream.write(lines + table.to_csv(index=False, float_format="%.9g"))
 
 
 EDITS = {"change": change, "drop": drop, "tabulate": tabulate}
@@ -76,7 +80,7 @@ def transcript(folder: Path, commands: str) -> Iterator[str]:
 
 @pytest.mark.parametrize("name", some(CASES, [name for name, case in CASES.items() if not case.get("slow")]))
 def test_commands_print_and_write_what_the_references_hold(name, root, tmp_path, file_regression):
-    for folder in ("configs", "data", "tests/files/visit"):
+    for folder in ("configs", "data", "tests/files/visit", "tests/files/recordings"):
         (tmp_path / Path(folder).name).symlink_to(root / folder)
     for campaign, text in CAMPAIGNS.items():
         (tmp_path / f"{campaign}.toml").write_text(Template(text).substitute(PARTS), encoding="utf-8")

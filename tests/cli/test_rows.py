@@ -1,4 +1,4 @@
-"""Files of which a column or a line above says which test a row belongs to, as typed."""
+"""Files of which a column says which test a row belongs to, as typed."""
 
 import tomllib
 from collections.abc import Sequence
@@ -67,42 +67,6 @@ def test_parts_are_a_batch(typed, points, tmp_path):
     (tmp_path / "y/campaign.toml").write_text(text.replace('specimen_number = "17"', ""), encoding="utf-8")
     asked = typed("fit", "y/campaign.toml", "-o", "f", status=2)
     refused(asked, tmp_path / "f", "tests of several parts", 'specimen_number = "..."')
-
-
-@pytest.mark.parametrize("stated", ["Temperature: 23 degC/60 degC", "Preload: 0 N/500 N", "Direction: axial/radial"])
-def test_a_line_above_blocks_applies_until_another_of_its_kind(typed, points, tmp_path, stated):
-    key, values = stated.split(": ")
-    lines = []
-    for value, factor in zip(values.split("/"), (1.0, 1.2), strict=True):
-        lines.append(f"{key}: {value}")
-        for amplitude in (0.1, 0.5):
-            rows = [row for row in points["axial"] if row[1] == amplitude]
-            lines += [f"Amplitude: {amplitude} mm", "Frequency [Hz];K* [N/mm];tan delta [-]"]
-            lines += [f"{row[0]};{factor * row[2]};{row[3]}" for row in rows]
-    (tmp_path / "blocks.csv").write_text("\n".join(lines), encoding="utf-8")
-    typed("init", "blocks.csv", *GEOMETRY, "-o", "x", *([] if key == "Direction" else ["--direction", "axial"]))
-    sweeps = load_campaign(tmp_path / "x/campaign.toml").sweeps
-    first = 1e3 * np.array([row[2] for row in points["axial"] if row[1] in (0.1, 0.5)])
-    conditions = [
-        f"{sweep.direction} {np.mean(0.0 if sweep.temperature is None else sweep.temperature)} {sweep.preload}"
-        for sweep in sweeps
-    ]
-    assert len(set(conditions)) == len(sweeps) == 2
-    for sweep, factor in zip(sweeps, (1.0, 1.2), strict=True):
-        assert sorted(np.abs(sweep.stiffness)) == pytest.approx(sorted(first * factor))
-
-
-def test_loops_of_one_file_at_two_preloads_are_a_campaign(typed, tmp_path):
-    time = np.linspace(0.0, 6.0, 600, endpoint=False)
-    lines = []
-    for preload in (0.0, 500.0):
-        motion, force = np.sin(np.pi * time), 500.0 * np.sin(np.pi * time + 0.1) + preload
-        lines += [f"Preload: {preload:g} N", "Time [s];Displacement [mm];Force [N]"]
-        lines += [f"{t:.3f};{x:.5f};{f:.3f}" for t, x, f in zip(time, motion, force, strict=True)]
-    (tmp_path / "axial.csv").write_text("\n".join(lines), encoding="utf-8")
-    typed("init", "axial.csv", *GEOMETRY, "-o", "x")
-    means = [np.mean(loop.force) for loop in load_campaign(tmp_path / "x/campaign.toml").loops]
-    assert means == pytest.approx([0.0, 500.0], abs=1.0)
 
 
 def test_what_is_not_understood_is_named(typed, points, tmp_path):
