@@ -159,8 +159,10 @@ def plan_document(
     Returns:
         Keys and values of the file, in SI units.
     """
-    knowledge, request, minutes = search.knowledge, search.request, search.minutes_of(runs)
-    planned, standard = search.count_runs(runs), search.count_runs(search.standard_runs)
+    knowledge, request, budget = search.knowledge, search.request, search.budget
+    planned, standard = search.counts, search.standard_counts
+    changes = np.diff(budget.place[list(runs)], prepend=-1) != 0
+    minutes = (budget.minutes[list(runs)] + budget.setup_minutes * changes).tolist()
     covariances = [search.error_covariance(counts) for counts in (0 * planned, planned, standard)]
 
     def compared(error: Callable[[Array], float]) -> ErrorComparison:
@@ -189,7 +191,7 @@ def plan_document(
         "hours": request.hours,
         "tests": [planned_run(search.tests[run], duration) for run, duration in zip(runs, minutes, strict=True)],
         "hours_planned": sum(minutes) / 60.0,
-        "hours_standard": sum(search.minutes_of(search.standard_runs)) / 60.0,
+        "hours_standard": budget.total_minutes(standard) / 60.0,
         "hours_left": request.hours - sum(minutes) / 60.0,
         "enough": enough,
         "targets": {

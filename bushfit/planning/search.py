@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import chain
+from itertools import chain, cycle
 
 import numpy as np
 
@@ -111,7 +111,7 @@ class PlanSearch:
         required = self.required_runs
         counts = best_runs(replace(self, penalty=_PENALTY), required, required)
         if self.less_visible_effects(counts):
-            standard = np.minimum(self.count_runs(self.standard_runs), self.budget.maximum_runs)
+            standard = np.minimum(self.standard_counts, self.budget.maximum_runs)
             starts = [counts, *([] if required.any() else [standard])]
             choices = (best_runs(self, start, required) for start in starts)
             counts = min(choices, key=self.objective)
@@ -148,16 +148,15 @@ class PlanSearch:
         return aim - self.penalty * np.sum(np.log(np.clip(share, 1e-12, 1.0)), axis=1)  # finite
 
     @cached_property
-    def standard_runs(self) -> list[int]:
-        """Test indices of the standard programme, repeated to fill the hours and ordered by direction."""
-        tests = [self.tests.index(test) for test in standard_tests(self.knowledge, self.request)]
-        runs = list[int]()
-        while tests:
-            runs.append(tests[len(runs) % len(tests)])
-            if self.budget.total_minutes(self.count_runs(runs)) > self.budget.maximum_minutes:
-                runs.pop()
+    def standard_counts(self) -> Array:
+        """Number of runs of each test in the standard programme, repeated to fill the hours, (tests,)."""
+        counts = np.zeros(len(self.tests), dtype=int)
+        for test in cycle(self.tests.index(test) for test in standard_tests(self.knowledge, self.request)):
+            counts[test] += 1
+            if self.budget.total_minutes(counts) > self.budget.maximum_minutes:
+                counts[test] -= 1
                 break
-        return sorted(runs, key=lambda test: self.budget.place[test])
+        return counts
 
     @cached_property
     def minimum_noncentrality(self) -> Array:
@@ -165,7 +164,7 @@ class PlanSearch:
 
         The value is for a typical amount of the effect; 0 if the programme cannot detect the largest possible amount.
         """
-        reached = self.models[0].total(self.count_runs(self.standard_runs)).noncentralities()[0]
+        reached = self.models[0].total(self.standard_counts).noncentralities()[0]
         amounts = [effect.amount for effect in self.effects]
         # the largest amount that a bushing or a rig can have, in typical amounts
         largest = [max(abs(end - (x.neutral or 0.0)) for end in x.bounds) / x.typical for x in amounts]
@@ -188,15 +187,6 @@ class PlanSearch:
                 if chosen.any() and (not tested or self.untested_warning(goal, required)):
                     required[int(np.argmin(np.where(chosen, values, np.inf)))] = 1
         return required if self.budget.total_minutes(required) <= self.budget.maximum_minutes else 0 * required
-
-    def count_runs(self, runs: Sequence[int]) -> Array:
-        """Number of runs of each test, (tests,), in a sequence of test indices."""
-        return np.bincount(np.array(runs, dtype=int), minlength=len(self.tests))
-
-    def minutes_of(self, runs: Sequence[int]) -> list[float]:
-        """Duration of each run in a sequence of test indices, with the change of direction before it [min]."""
-        changes = np.diff(self.budget.place[list(runs)], prepend=-1) != 0
-        return (self.budget.minutes[list(runs)] + self.budget.setup_minutes * changes).tolist()
 
     def reaches_aim(self, *, with_checks: bool = False) -> bool:
         """Check that the chosen tests separate the rival models with a margin of two, or meet the reachable targets.
