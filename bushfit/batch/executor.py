@@ -45,13 +45,11 @@ class Workers:
     """Worker processes of a batch, on this machine or on a cluster.
 
     Args:
-        place: location of the workers for messages, such as "this machine" or the address of the cluster.
         open: function that starts an executor; called again if the last executor is broken.
-        count: function that returns the number of workers; raises a BatchError if the connection to them is lost.
+        count: function that returns the number of workers, at least 1; raises a BatchError if they are lost.
         close: function that is called at the end of the batch.
     """
 
-    place: str
     open: Callable[[], Executor]
     count: Callable[[], int]
     close: Callable[[], object] = lambda: None
@@ -75,7 +73,7 @@ def local_workers(processes: int) -> Workers:
         context.set_forkserver_preload(["bushfit.batch.row", "bushfit.commands.respond", "bushfit.commands.run"])
         ensure_running()
     pool = partial(ProcessPoolExecutor, processes, context, initializer=_start_worker)
-    return Workers("this machine", pool, lambda: processes)
+    return Workers(pool, lambda: processes)
 
 
 def _start_worker() -> None:
@@ -91,11 +89,12 @@ def _start_worker() -> None:
         threading.Thread(target=follow, args=(parent,), daemon=True).start()
 
 
-def dask_workers(address: str) -> Workers:
+def dask_workers(address: str, warn: Callable[[str], object]) -> Workers:
     """Connect to the workers of a Dask cluster, which must see the same files; workers may join and leave.
 
     Args:
         address: address of the Dask scheduler, such as tcp://10.0.0.5:8786.
+        warn: function that is called with a sentence when the cluster has no worker.
 
     Returns:
         Workers whose executor sends tasks to the cluster.
@@ -120,14 +119,21 @@ def dask_workers(address: str) -> Workers:
         raise BatchError(problem, place="--scheduler", found=found, expected=expected, hint=hint) from None
 
     def count() -> int:
-        """Count the worker threads of the cluster; a lost connection to the scheduler raises a BatchError."""
+        """Count the worker threads of the cluster, and wait for the first one; a lost cluster raises a BatchError."""
+        hint = "the same command with --resume continues from here"
         with suppress(OSError, RuntimeError):
+            if client.status == "running" and not client.nthreads():
+                warn(f"no worker at {address}: waiting {NO_WORKER_SECONDS:.0f} s for one")
+                try:
+                    client.wait_for_workers(1, NO_WORKER_SECONDS)
+                except TimeoutError:
+                    hint = f"dask worker {address}; then {hint}"
+                    raise BatchError("no Dask worker is left", place="--scheduler", found=address, hint=hint) from None
             if client.status == "running":
                 return sum(client.nthreads().values())
-        hint = "the same command with --resume continues from here"
         raise BatchError("the connection to the Dask scheduler is lost", found=address, hint=hint)
 
-    return Workers(address, partial(client.get_executor, pure=False), count, partial(client.close, _ANSWER_SECONDS))
+    return Workers(partial(client.get_executor, pure=False), count, partial(client.close, _ANSWER_SECONDS))
 
 
 async def _ask_kind(address: str) -> str:
@@ -139,11 +145,7 @@ async def _ask_kind(address: str) -> str:
 
 
 def run_rows(
-    rows: Sequence[Task],
-    work: Callable[[Task], Outcome],
-    give_up: Callable[[str], Outcome],
-    workers: Workers,
-    warn: Callable[[str], object] = lambda _: None,
+    rows: Sequence[Task], work: Callable[[Task], Outcome], give_up: Callable[[str], Outcome], workers: Workers
 ) -> Iterator[tuple[int, Outcome]]:
     """Evaluate all rows of a batch (one row for each part) on the workers, in any order.
 
@@ -152,7 +154,6 @@ def run_rows(
         work: function that evaluates a row; it may be called several times with the same row.
         give_up: function that makes the outcome of a row whose worker dies repeatedly, from a sentence with the reason.
         workers: workers of this machine or of a cluster.
-        warn: function that is called with a sentence when no worker is available.
 
     Returns:
         Iterator over index and outcome of each row, in the order in which the rows finish.
@@ -161,17 +162,11 @@ def run_rows(
         BatchError: no worker starts, or the cluster is lost.
     """
     queue, out, failures = deque(range(len(rows))), dict[Future[Outcome], int](), Counter[int]()
-    executor, width, looked, alone_since = workers.open(), 1, 0.0, 0.0
+    executor, width, looked = workers.open(), 1, 0.0
     try:
         while queue or out:
             if time.monotonic() > looked + _LOOK_SECONDS:
-                looked, count = time.monotonic(), workers.count()
-                width, alone_since = _ROWS_PER_WORKER * max(1, count), 0.0 if count else alone_since or looked
-                if alone_since == looked:
-                    warn(f"no worker at {workers.place}: waiting {NO_WORKER_SECONDS:.0f} s for one")
-                elif alone_since and looked > alone_since + NO_WORKER_SECONDS:
-                    hint = f"dask worker {workers.place}; then the same command with --resume continues from here"
-                    raise BatchError("no Dask worker is left", place="--scheduler", found=workers.place, hint=hint)
+                width, looked = _ROWS_PER_WORKER * workers.count(), time.monotonic()
             while queue and len(out) < (1 if failures else width):  # a row that failed runs alone
                 number = queue.popleft()
                 try:

@@ -55,12 +55,7 @@ def check_output(plan: BatchPlan, *, force: bool) -> None:
             raise
 
 
-def run_batch(
-    plan: BatchPlan,
-    workers: Workers,
-    before_writing: Callable[[BatchResult], None],
-    warn: Callable[[str], object] = lambda _: None,
-) -> BatchResult:
+def run_batch(plan: BatchPlan, workers: Workers, before_writing: Callable[[BatchResult], None]) -> BatchResult:
     """Evaluate all rows, then write the files of the whole batch.
 
     Args:
@@ -68,7 +63,6 @@ def run_batch(
         workers: workers of this machine or of a cluster.
         before_writing: function that is called with the result when all files are ready; if it raises, the rows are
             kept, and no file of the whole batch is written.
-        warn: function that is called with a sentence when a cluster has no workers.
 
     Returns:
         Results of all rows.
@@ -85,7 +79,7 @@ def run_batch(
             notes = remove_unlisted_parts(plan)
             records, counts = [RowFile(status="failed")] * len(plan.rows), Counter[str]()
             lost = lambda reason: (RowFile(status="failed", error=reason), False)  # noqa: E731
-            finished = run_rows(plan.rows, plan.task, lost, workers, warn)
+            finished = run_rows(plan.rows, plan.task, lost, workers)
             remark = lambda: f"{counts['failed']} failed" if counts["failed"] else ""  # noqa: E731
             for number, (record, was_kept) in track("bushings", finished, len(records), remark):
                 records[number] = replace(record, inputs={}, files={})  # only a later run asks for these

@@ -78,7 +78,8 @@ def command(
 
     # Workers import their modules while this process reads the manifest.
     jobs, scheduler = options["jobs"] or os.cpu_count() or 1, options["scheduler"]
-    workers = local_workers(jobs) if scheduler is None else dask_workers(scheduler)
+    warn = partial(output.messages.print, "warning:", markup=False)
+    workers = local_workers(jobs) if scheduler is None else dask_workers(scheduler, warn)
     from bushfit.batch.limits import read_limits
     from bushfit.batch.manifest import RowSettings, read_manifest
     from bushfit.batch.quantities import parse_point
@@ -102,8 +103,7 @@ def command(
     task = RowTask(folder.absolute(), tuple(dict.fromkeys(points)), formats, resume)
     plan = BatchPlan(listed.title, listed.rows, task, judged_by, junit, output.formats)
     check_output(plan, force=output.force)
-    warn = partial(output.messages.print, "warning:", markup=False)
-    result = run_batch(plan, workers, lambda result: output.print_json(result.summary), warn)
+    result = run_batch(plan, workers, lambda result: output.print_json(result.summary))
     _print_result(output, result, folder)
     if result.document.failed or result.document.missed or result.document.not_judged:
         click.get_current_context().exit(1)
