@@ -141,17 +141,12 @@ class PlanFile(WarningEntries):
 
 
 def plan_document(
-    search: PlanSearch,
-    runs: Sequence[int],
-    missed: Sequence[str | None],
-    enough: str | None,
-    warnings: Sequence[Caveat],
+    search: PlanSearch, missed: Sequence[str | None], enough: str | None, warnings: Sequence[Caveat]
 ) -> PlanFile:
     """Collect the content of plan.json.
 
     Args:
         search: search with the candidate tests.
-        runs: test indices of the plan in the order of the runs.
         missed: reason why the plan misses each target; None for a target that it meets.
         enough: reason why hours remain free; None if the hours are used.
         warnings: warnings and limits of the plan.
@@ -161,8 +156,8 @@ def plan_document(
     """
     knowledge, request, budget = search.knowledge, search.request, search.budget
     planned, standard = search.counts, search.standard_counts
-    changes = np.diff(budget.place[list(runs)], prepend=-1) != 0
-    minutes = (budget.minutes[list(runs)] + budget.setup_minutes * changes).tolist()
+    changes = np.diff(budget.place[search.runs], prepend=-1) != 0
+    minutes = (budget.minutes[search.runs] + budget.setup_minutes * changes).tolist()
     covariances = [search.error_covariance(counts) for counts in (0 * planned, planned, standard)]
 
     def compared(error: Callable[[Array], float]) -> ErrorComparison:
@@ -189,7 +184,7 @@ def plan_document(
         "source": knowledge.source,
         "aim": request.aim,
         "hours": request.hours,
-        "tests": [planned_run(search.tests[run], duration) for run, duration in zip(runs, minutes, strict=True)],
+        "tests": [planned_run(search.tests[run], duration) for run, duration in zip(search.runs, minutes, strict=True)],
         "hours_planned": sum(minutes) / 60.0,
         "hours_standard": budget.total_minutes(standard) / 60.0,
         "hours_left": request.hours - sum(minutes) / 60.0,

@@ -1,4 +1,4 @@
-"""Choose the best tests within the available hours by exchanging tests, and order the runs."""
+"""Choose the best tests within the available hours by exchanging tests."""
 
 from __future__ import annotations
 
@@ -147,26 +147,3 @@ def add_runs(
         counts[best] += 1
         value = values[best]
     return counts
-
-
-def order_runs(counts: Array, places: Array) -> list[int]:
-    """Order the runs of a session so that a drift of the gain hardly shifts the parameters.
-
-    Runs are grouped by direction. Each direction begins and ends with its most repeated test, and the runs between are
-    mirrored about the middle, so that the repeats of a test are spread over the session.
-
-    Args:
-        counts: number of runs of each test, (tests,).
-        places: index of the direction of each test, in the order in which the directions are mounted, (tests,).
-
-    Returns:
-        Test indices in the order of the runs.
-    """
-    order = list[int]()
-    for place in np.unique(places[counts > 0]):
-        chosen = np.where(places == place, counts, 0)
-        outer = [int(np.argmax(chosen))] if chosen.max() > 1 else []
-        chosen[outer] -= 2
-        inner = np.repeat(np.arange(chosen.size), chosen).tolist()
-        order += [*outer, *inner[::2], *inner[1::2][::-1], *outer]
-    return order

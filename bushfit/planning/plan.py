@@ -11,7 +11,7 @@ from bushfit.errors import ModelError
 from bushfit.planning.candidates import unlimited_rig_warning
 from bushfit.planning.contract import Knowledge, PlanRequest, Test
 from bushfit.planning.document import PlanFile, plan_document
-from bushfit.planning.exchange import add_runs, order_runs
+from bushfit.planning.exchange import add_runs
 from bushfit.planning.search import RIVALS_APART, PlanSearch
 from bushfit.planning.targets import UNLIMITED_RUNS, PlannedQuantity, format_half_width
 from bushfit.units import number
@@ -74,7 +74,7 @@ def plan(knowledge: Knowledge, request: PlanRequest) -> Plan:
         if first < len(shorter):
             search = shorter[first]
             break
-    counts, places = search.counts, search.budget.place
+    counts = search.counts
     if not counts.any() and not search.reaches_aim():
         shortest = float(search.budget.minutes.min() + search.budget.setup_minutes) / 60.0
         raise ModelError(
@@ -83,14 +83,13 @@ def plan(knowledge: Knowledge, request: PlanRequest) -> Plan:
             found=f"{number(request.hours, 3)} h",
             expected=f"at least {number(shortest, 2)} h",
         )
-    runs = order_runs(counts, places)
     missed = [explain_miss(search, goal) for goal in search.goals]
     enough, warnings = explain_free_hours(search, missed), list(plan_warnings(search))
     return Plan(
         knowledge,
-        tuple(search.tests[run] for run in runs),
+        tuple(search.tests[run] for run in search.runs),
         {search.tests[test]: describe_purpose(search, test) for test in np.flatnonzero(counts).tolist()},
-        plan_document(search, runs, missed, enough, warnings),
+        plan_document(search, missed, enough, warnings),
     )
 
 

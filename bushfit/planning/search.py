@@ -117,6 +117,22 @@ class PlanSearch:
             counts = min(choices, key=self.objective)
         return self.with_scatter(self.with_repeats(counts))
 
+    @cached_property
+    def runs(self) -> list[int]:
+        """Test indices of the chosen runs in an order in which a drift of the gain hardly shifts the parameters.
+
+        Runs are grouped by direction. Each direction begins and ends with its most repeated test, and the runs between
+        are mirrored about the middle, so that the repeats of a test are spread over the session.
+        """
+        order = list[int]()
+        for place in np.unique(self.budget.place[self.counts > 0]):
+            chosen = np.where(self.budget.place == place, self.counts, 0)
+            outer = [int(np.argmax(chosen))] if chosen.max() > 1 else []
+            chosen[outer] -= 2
+            inner = np.repeat(np.arange(chosen.size), chosen).tolist()
+            order += [*outer, *inner[::2], *inner[1::2][::-1], *outer]
+        return order
+
     def objective(self, counts: Array) -> float:
         """Objective that the plan minimises, for `counts` runs of each test, (tests,)."""
         return float(self.objectives([model.total(counts) for model in self.models])[0])

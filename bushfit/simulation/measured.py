@@ -23,7 +23,7 @@ from bushfit.reading.runs import runs_of
 from bushfit.reading.tablefile import folder_name
 from bushfit.reduction.programme import split_record
 from bushfit.reduction.resonance import reduce_resonance
-from bushfit.simulation.undisturbed import Undisturbed, extrapolate_stiffness, undisturbed
+from bushfit.simulation.undisturbed import Undisturbed, undisturbed
 
 if TYPE_CHECKING:
     from numpy.random import Generator
@@ -86,8 +86,8 @@ def measure(clean: Undisturbed, plan: SimulateSettings) -> Simulated:
         The simulated campaign.
 
     Notes:
-        If a sweep does not reach its amplitudes, its stiffness is evaluated at the amplitude reached (see
-        `extrapolate_stiffness`). If the model depends on the order of the tests, the loops come first.
+        If a sweep does not reach its amplitudes, its stiffness is evaluated at the amplitude reached, as
+        `simulation.undisturbed` states. If the model depends on the order of the tests, the loops come first.
     """
     planned = [test for kind in (clean.loops, clean.sweeps, clean.resonances) for test, _ in kind]
     conditions = planned_session(clean.truth.bushing, planned, plan.repeats)[len(clean.loops) :]
@@ -164,9 +164,10 @@ def _noisy_sweep(
         ratios = np.exp(test.reached * np.sqrt(0.5) * (of_frequency + random.standard_normal(shape)))
         reached = level * ratios.ravel()
     if test.reached or truth.depends_on:
-        planned = frequency, level, stiffness.ravel(), RubberConditions(test.temperature, preload=test.static)
-        nearby = extrapolate_stiffness(truth, test.direction, *planned, conditions)
-        stiffness = nearby(level if reached is None else reached).reshape(shape)
+        planned, place = RubberConditions(test.temperature, preload=test.static), test.direction
+        ratio = stiffness.ravel() / truth.stiffness(place, frequency, level, conditions=planned)
+        amplitude = level if reached is None else reached
+        stiffness = (ratio * truth.stiffness(place, frequency, amplitude, conditions=conditions)).reshape(shape)
     if plan.level_gain_error or plan.level_phase_error:
         gain, phase = random.standard_normal((2, shape[0], 1, 1))
         stiffness = stiffness * (1.0 + plan.level_gain_error * gain) * np.exp(1j * plan.level_phase_error * phase)
