@@ -34,6 +34,11 @@ class QuantityTable:
     cp: tuple[float, float, float] | None
     cpk: tuple[float, float, float] | None
 
+    @property
+    def limits(self) -> list[float]:
+        """Lower and upper limit; empty without limits."""
+        return [limit for limit in (self.min, self.max) if limit is not None]
+
 
 @dataclass(frozen=True, kw_only=True)
 class PartTable:

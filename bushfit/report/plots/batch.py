@@ -44,8 +44,7 @@ def quantities_to_draw(batch: BatchFile, table: pd.DataFrame) -> list[str]:
         table: table of the batch, batch.csv.
     """
     quantities = batch.quantities.items()
-    unlimited = {header for header, quantity in quantities if quantity.min is None and quantity.max is None}
-    return [header for header, _ in quantities if table[header].count() >= (3 if header in unlimited else 1)]
+    return [header for header, quantity in quantities if table[header].count() >= (1 if quantity.limits else 3)]
 
 
 @style.fixed_settings()
@@ -83,16 +82,10 @@ def batch_figure(batch: BatchFile, table: pd.DataFrame) -> style.Chart:
     return figure.explain(
         "Grey line: median of the batch.",
         "Bars: 95 % intervals." * (len(names) <= _MOST_INTERVALS),
-        "Dashed: limits; red: outside the limits." * any(_limits(batch, header) for header in drawn),
+        "Dashed: limits; red: outside the limits." * any(batch.quantities[header].limits for header in drawn),
         "Triangles: outside the panel.",
         f"The first {len(drawn)} of {len(headers)} quantities." * (len(headers) > len(drawn)),
     )
-
-
-def _limits(batch: BatchFile, header: str) -> list[float]:
-    """Lower and upper limit of a quantity, in the unit of its header; empty without limits."""
-    quantity = batch.quantities[header]
-    return [limit for limit in (quantity.min, quantity.max) if limit is not None]
 
 
 def _draw_quantity(axes: Axes, batch: BatchFile, table: pd.DataFrame, header: str) -> None:
@@ -106,7 +99,8 @@ def _draw_quantity(axes: Axes, batch: BatchFile, table: pd.DataFrame, header: st
         table: table of the batch, with n rows.
         header: column header of the quantity.
     """
-    all_values, limits, name = table[header].to_numpy(dtype=float), _limits(batch, header), split_header(header)[0]
+    all_values, limits = table[header].to_numpy(dtype=float), batch.quantities[header].limits
+    name = split_header(header)[0]
     missed = [part.name for part in batch.parts if name in part.misses]
     bad = np.array([name in part.misses for part in batch.parts]) & np.isfinite(all_values)
     x, finite, widths = np.arange(1, len(table) + 1), all_values[np.isfinite(all_values)], np.empty(0)

@@ -35,11 +35,7 @@ _SAME = 0.01
 
 @style.fixed_settings()
 def prediction_figure(
-    result: Result,
-    prediction: Prediction,
-    table: pd.DataFrame | None,
-    title: str,
-    note: str = "",
+    result: Result, prediction: Prediction, table: pd.DataFrame | None, title: str, note: str = ""
 ) -> style.Chart:
     """Figure of predicted stiffness magnitude and loss factor over frequency and over amplitude, with measured points.
 

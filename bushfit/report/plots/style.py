@@ -85,6 +85,8 @@ _SETTINGS: dict[Any, Any] = {
     # one font to search for, not the fourteen of "sans-serif", and installed ones for names in further scripts
     "font.family": ["DejaVu Sans", *sorted({font.name for font in fontManager.ttflist} & _WIDER_FONTS)],
 }
+#: Lines of a legend by their labels; several lines are drawn on each other.
+LegendLines = Mapping[str, Line2D | tuple[Line2D, ...]]
 #: matplotlib's settings belong to the process: one figure at a time changes them.
 _LOCK = RLock()
 
@@ -277,11 +279,7 @@ def mark_outliers(axes: Axes, x: Array, y: Array) -> None:
 
 
 def legend(
-    axes: Axes,
-    handles: Sequence[Line2D],
-    labels: Sequence[str],
-    title: str,
-    extra_lines: Mapping[str, Line2D | tuple[Line2D, ...]] | None = None,
+    axes: Axes, handles: Sequence[Line2D], labels: Sequence[str], title: str, extra_lines: LegendLines | None = None
 ) -> None:
     """Add a legend right of a panel.
 
@@ -303,7 +301,7 @@ def name_levels(
     levels: Sequence[str],
     quantity: str,
     marked: Sequence[bool] = (),
-    extra_lines: Mapping[str, Line2D | tuple[Line2D, ...]] | None = None,
+    extra_lines: LegendLines | None = None,
 ) -> None:
     """Add a legend of the curves of a panel by their amplitude, frequency or temperature; a colour bar for over eight.
 
