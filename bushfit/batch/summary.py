@@ -311,7 +311,7 @@ class BatchResult:
         ]
         if missing:
             sentence = f"the tests of {listed(missing)} deviate from the model by more than noise explains"
-            warnings.append(Caveat("part_misfit", f"{sentence}: --command diagnose looks for the cause"))
+            warnings.append(Caveat("part_misfit", f"{sentence}: bushfit batch --command diagnose looks for the cause"))
         if lacking := [part.name for part, lacks in zip(parts, self.lacks_sweep, strict=True) if lacks]:
             sentence = f"no sweep, unlike the other parts, and so not compared with them: {listed(lacking)}"
             warnings.append(Caveat("part_without_sweep", sentence))

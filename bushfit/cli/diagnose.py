@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from bushfit.diagnosis.document import EffectEntry
 
 #: Title of the regions in which model and tests disagree.
-_WHERE = "where; x noise: the smooth part of the gap relative to its noise, which is smaller than that of a point"
+_WHERE = "where (x noise: rms of the smooth part of the gap, in units of its own standard error)"
 #: Terminal colours of the verdicts.
 _COLOURS = {"consistent": "green", "named": "green", "unexplained": "red"}
 
@@ -102,15 +102,14 @@ def print_diagnosis(output: Output, diagnosed: DiagnosisOutput) -> None:
 def print_verdict(output: Output, diagnosed: DiagnosisOutput, action: str = "") -> None:
     """Print the verdict of a diagnosis, the next step (`action`), a summary, and probabilities of missing effects."""
     from bushfit.diagnosis.record import format_odds
+    from bushfit.report.diagnosed import permitted_use
 
-    colour = _COLOURS.get(diagnosed.headline, "yellow")
-    output.print_headline(diagnosed.data.campaign.name, diagnosed.headline, action, f"bold {colour}")
-    for line in (diagnosed.diagnosis.summary, *format_odds(diagnosed.document)):
+    colour, use = _COLOURS.get(diagnosed.headline, "yellow"), permitted_use(diagnosed.document)
+    output.print_headline(diagnosed.data.campaign.name, diagnosed.headline, action or use, f"bold {colour}")
+    lines = [use] if action and colour != "green" else []
+    lines += [*diagnosed.diagnosis.summary.split("; "), *format_odds(diagnosed.document)]
+    for line in (*lines, *filter(None, [diagnosed.adopt])):
         output.console.print(f"  {escape(line)}")
-    if diagnosed.adopt:
-        output.print(f"  {diagnosed.adopt}")
-    if diagnosed.diagnosis.verdict == "ambiguous" and diagnosed.diagnosis.added:
-        output.print("  otherwise use model.json, whose bands include all explanations")
 
 
 def print_findings(output: Output, diagnosed: DiagnosisOutput) -> None:
@@ -118,7 +117,7 @@ def print_findings(output: Output, diagnosed: DiagnosisOutput) -> None:
     console, diagnosis, document = output.console, diagnosed.diagnosis, diagnosed.document
     for effect in document["effects"]:
         _print_effect(output, effect)
-    _print_gap(output, document, diagnosis.changed)
+    _print_gap(output, document)
     for title, regions in ((_WHERE, diagnosis.where), ("what remains", diagnosis.remainder)):
         if regions and not (title == "what remains" and diagnosis.remainder == diagnosis.where):
             console.print(f"  [bold]{title}[/bold]")
@@ -128,22 +127,14 @@ def print_findings(output: Output, diagnosed: DiagnosisOutput) -> None:
         console.print(f"  [bold]next test:[/bold] {escape(diagnosis.next_test)}")
 
 
-def _print_gap(output: Output, document: Mapping[str, Any], changed: bool) -> None:
-    """Print the gap (misfit in units of noise) for held-out and fitted data.
-
-    Args:
-        output: where to print.
-        document: content of diagnosis.json.
-        changed: True if the diagnosis changed the model or the record.
-    """
+def _print_gap(output: Output, document: Mapping[str, Any]) -> None:
+    """Print the gap (misfit in units of noise) for held-out and fitted data, from the content of diagnosis.json."""
     gap = document["gap"]
     held_out = gap["heldout"]
     cells = [f"{held_out[when]:.2f}" for when in ("before", "after")] if held_out else ["not testable", ""]
     rows = (("held out", *cells), ("data fitted", *(f"{value:.2f}" for value in gap["calibration"].values())))
     title = "gap (measured minus model) in units of the noise; 1: noise alone"
-    if document["verdict"] != "consistent" and not changed:
-        title += "; the diagnosis added nothing, and all tests were fitted"
-    elif any(effect["correction"] for effect in document["effects"]):
+    if any(effect["correction"] for effect in document["effects"]):
         title += "; after: with the corrected record"
     output.print_table(title, ("", "before", "after"), rows)
     if output.verbose:
@@ -152,7 +143,7 @@ def _print_gap(output: Output, document: Mapping[str, Any], changed: bool) -> No
 
 
 def _print_effect(output: Output, effect: EffectEntry) -> None:
-    """Print one named effect: description, parameter values, and effects that the tests cannot distinguish from it."""
+    """Print one named effect: description, parameter values, and the correction of a mistake in the record."""
     from bushfit.effects.unnamed import effect_label
     from bushfit.report.parameters import effect_sizes
 
@@ -163,7 +154,5 @@ def _print_effect(output: Output, effect: EffectEntry) -> None:
     console.print(f"  [bold]{name}[/bold]{escape(test)} ({level}): {escape(effect['sentence'])}")
     for parameter, value, interval in effect_sizes(effect):
         console.print(f"    {parameter} = {value}, {f'95 % {interval}' if interval else 'no interval'}")
-    if effect["twins"]:
-        console.print(f"    the tests cannot distinguish {effect['name']} from {' or '.join(effect['twins'])}")
     if effect["correction"]:
         console.print(f"    correction in the campaign: {escape(effect['correction'])}")

@@ -70,7 +70,7 @@ def parse_cardanic(text: str) -> complex:
     ),
 )
 @prediction_options("Use the frequencies and amplitudes of this campaign.")
-@with_output("results/<name>/export", "tables")
+@with_output("results/<model name>/export", "tables")
 def command(model: Path, formats: tuple[str, ...], campaign: Path | None, output: Output, **settings: Any) -> None:
     """Write a fitted model for other programs: a solver, a multibody code, a spreadsheet.
 
@@ -98,7 +98,7 @@ def command(model: Path, formats: tuple[str, ...], campaign: Path | None, output
     settings |= {"dialect": dialect or "nastran", "decimal_comma": comma}
     grid: Any = {key: settings.pop(key) for key in GridOptions.__annotations__}
     document, files = export(result, model_source(file), names, loaded, grid, **settings)
-    folder = output.folder((loaded or result).name, *(part.name for part in files))
+    folder = output.folder(result.name, *(part.name for part in files))
     limits = dict[Caveat, list[str]]()
     for name, entry in document["formats"].items():
         for limit in to_caveats(entry["left_out"], entry["left_out_kinds"]):

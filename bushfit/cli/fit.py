@@ -127,12 +127,11 @@ def _print_and_write(
     by_kind = {warning.kind: warning.text for warning in result.warnings}
     misses = not _MISFITS.isdisjoint(by_kind)
     if quality := result.quality:
-        figures = (
-            f"NRMSE {number(100 * quality.nrmse, 2)} %, reduced chi-square {number(quality.reduced_chi_square, 3)}"
-        )
-        verdict = f"the model {'misses' if misses else 'meets'} the tests: {figures} (1 is noise alone)"
+        verdict = f"the model {'misses' if misses else 'meets'} the tests: NRMSE {number(100 * quality.nrmse, 2)} %"
+        verdict += f", reduced chi-square {number(quality.reduced_chi_square, 3)} (1 is noise alone)"
         if misses:
-            action = f"bushfit diagnose {file} finds what the model lacks"
+            start = f" --model {written}" if {*result.model.effects} - {*fitted.data.effects} else ""
+            action = f"bushfit diagnose {file}{start} finds what the model lacks"
             action = action if result.fitted else f"free a parameter in [fit] of {file}, and fit again"
     if fitted.files[0].name == "static":
         action = f"bushfit fit-dynamic {file} --static {written} fits m and alpha"

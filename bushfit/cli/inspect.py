@@ -113,4 +113,4 @@ def print_inspection(output: Output, inspection: Inspection) -> None:
     for warning in inspection.odd:
         console.print(f"  [yellow]unusual:[/yellow] {escape(warning.text)}")
     if not inspection.odd:
-        console.print("  nothing unusual")
+        console.print("  nothing else is unusual" if inspection.assumed else "  nothing unusual")

@@ -127,8 +127,6 @@ def _print_plan(output: Output, plan: Plan) -> None:
         for place, row in document["stiffness"].items()
     )
     runs = f"{len(document['tests'])} runs in {hours} h"
-    misses = plan.knowledge.result.model_error is not None
-    condition, included = (", without model error", ", with model error") if misses else ("", "")
     if rivals := document["rivals"]:
         chi_square, standard = (number(rivals[key], 3) for key in ("planned", "standard"))
         output.print(
@@ -136,22 +134,22 @@ def _print_plan(output: Output, plan: Plan) -> None:
             f"programme {standard}; {number(rivals['enough'], 3)} distinguishes them in nine of ten cases"
         )
     else:
-        output.print(f"{runs} reduce the standard error of the stiffness{included}: {', '.join(gains)}")
+        if "plan_model_error" in document["warning_kinds"]:
+            output.print("diagnose first, and plan from its model.json: no test reduces the error of the present model")
+        output.print(f"{runs} reduce the standard error of the stiffness: {', '.join(gains)}")
     output.print(f"starting point: {document['source']}")
     _print_tests(output, plan)
     error_columns = "quantity", "before", f"plan, {hours} h", f"standard, {number(document['hours_standard'], 3)} h"
-    rows = {f"{name}{condition}": row for name, row in document["parameters"].items()}
-    rows |= {f"stiffness, {place}{included}": row for place, row in document["stiffness"].items()}
-    rows |= {f"loss factor, {place} [0.01]{included}": row for place, row in document["loss_factor"].items()}
+    rows = dict(document["parameters"])
+    rows |= {f"stiffness, {place}": row for place, row in document["stiffness"].items()}
+    rows |= {f"loss factor, {place} [0.01]": row for place, row in document["loss_factor"].items()}
     title = "standard errors [%]: before these tests, after the plan, and after the standard programme"
+    if plan.knowledge.result.model_error is not None:
+        title += "; stiffness and loss factor: with the model error, parameters: without"
     output.print_table(title, error_columns, _percents(rows, ("before", "planned", "standard")))
     if targets := document["targets"]:
         sizes = _percents(targets, ("asked", "before", "planned", "standard"))
-        parameters = document["parameters"]
-        met = (
-            ("met" if target["met"] else "not met") + (condition if name in parameters else "")
-            for name, target in targets.items()
-        )
+        met = ("met" if target["met"] else "not met" for target in targets.values())
         columns = ("quantity", "asked for", "before", "plan", "standard", "")
         title = "targets: half width of the 95 % interval at the widest point [%]"
         output.print_table(title, columns, [(*row, verdict) for row, verdict in zip(sizes, met, strict=True)])

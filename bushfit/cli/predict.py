@@ -74,7 +74,7 @@ def parse_motion(text: str) -> LargeMotion:
         type=quantity("1"),
     ),
 )
-@with_output("results/<name>/predict", "tables", "pictures")
+@with_output("results/<model name>/predict", "tables", "pictures")
 def command(model: Path, campaign: Path | None, bushing: str | None, output: Output, **settings: Any) -> None:
     """Predict dynamic stiffness and loss factor over frequency and amplitude, with 95 % bands.
 
@@ -96,7 +96,7 @@ def command(model: Path, campaign: Path | None, bushing: str | None, output: Out
     target = None if bushing is None else _bushing_of(result, bushing)
     predicted = predict(result, loaded, bushing=target, **settings)
     tables = (output.formats.table(file.name) for file in predicted.files if file.kind == "table")
-    folder = output.folder((loaded or predicted.result).name, *tables)
+    folder = output.folder(predicted.result.name, *tables)
     _print_summary(output, predicted)
     print_predictions(output, predicted)
     for resonance in predicted.resonances:
@@ -138,8 +138,7 @@ def _print_summary(output: Output, predicted: PredictionOutput) -> None:
     if warnings := predicted.warnings:
         verdict += f", with {len(warnings)} warning{'s' * (len(warnings) > 1)}"
         first = min(warnings, key=attrgetter("rank"))
-        subject = f" ({first.subject})" if first.subject in places else ""
-        action = f"first warning below{subject}: {first.consequence}"
+        action = f"{first.subject}: {first.consequence}" if first.subject in places else first.consequence
     output.print_headline(predicted.result.name, verdict, action)
     for prediction in predicted.predictions:
         force, loss = prediction.direction.display.stiffness, prediction.loss_factor.value

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     TEMPERATURE,
 )
 @metadata_options("displacements")
-@with_output("results/<name>/respond", "tables", "pictures")
+@with_output("results/<model name>/respond", "tables", "pictures")
 def command(model: Path, history: Path, directions: tuple[str, ...], output: Output, **settings: Any) -> None:
     """Predict the force over time for a displacement history, with its 95 % band.
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,16 +11,13 @@ from bushfit.cli.output import Output, with_output
 from bushfit.cli.predict import print_predictions
 from bushfit.cli.printing import print_origin, print_result, print_step, print_validations
 from bushfit.cli.shared_options import campaign_options, exit_above, open_campaign
-from bushfit.units import format_range
+from bushfit.units import format_range, number
 
 if TYPE_CHECKING:
     from bushfit.campaign.schema import Loss
     from bushfit.commands.run import RunOutput
     from bushfit.fitting.procedures import TwoStep
     from bushfit.model.result import Result
-
-#: Largest difference between two fits that agree, in standard errors.
-_AGREED = 2
 
 
 @command_called("run", "configs/cmp_15961.toml")
@@ -45,14 +41,16 @@ def command(campaigns: tuple[Path, ...], loss: Loss | None, max_nrmse: float | N
     folder = output.folder(campaign.name, "model.json", "diagnosis.json")
     outcome = run(campaign, loss=loss)
     output.warn(outcome.data.notes)
-    diagnosis, description = outcome.diagnosed and outcome.diagnosed.diagnosis, "the joint fit"
+    diagnosis, action = outcome.diagnosed and outcome.diagnosed.diagnosis, f"use {folder / 'model.json'}, "
     if diagnosis and diagnosis.added:
         effects, before = diagnosis.result.model.effects, diagnosis.before.model.effects
         added = [effect_label(name) for name in effects if name not in before]
-        description = f"with {', '.join(added)}; joint.json is the fit without {'it' if len(added) == 1 else 'them'}"
-    elif diagnosis and diagnosis.changed:  # a mistake in the record is named
-        description += " to the uncorrected tests: correct the record first, then run again"
-    print_run(output, campaign.name, outcome, f"use {folder / 'model.json'}, {description}")
+        action += f"with {' and '.join(added)}; joint.json is the fit without {'it' if len(added) == 1 else 'them'}"
+    elif diagnosis and (diagnosis.changed or diagnosis.verdict == "unexplained"):
+        action = ""  # no model to use before the record is corrected, or the cause is known
+    else:
+        action += "the joint fit"
+    print_run(output, campaign.name, outcome, action)
     output.write(folder, outcome.files, outcome.document, input_files(campaign))
     exit_above(max_nrmse, outcome.result)
 
@@ -121,9 +119,6 @@ def two_step_line(two_step: TwoStep, joint: Result) -> str:
     if found.at_bound:
         parts.append(f"ended at a bound: {', '.join(found.at_bound)}")
     elif differences:
-        count = max(1, math.ceil(round(max(differences.values()), 1)))
-        agrees = f"agrees with the joint fit within {count} standard error{'s' * (count > 1)}"
         farthest = max(differences, key=differences.__getitem__)
-        differs = f"does not agree with the joint fit; largest difference: {farthest}"
-        parts.append(agrees if count <= _AGREED else differs)
+        parts.append(f"up to {number(differences[farthest], 2)} standard errors from the joint fit ({farthest})")
     return f"two-step procedure (the paper's): {', '.join(parts)} (static.json, dynamic.json; -v shows the parameters)"

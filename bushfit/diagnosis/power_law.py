@@ -111,7 +111,7 @@ class PowerLaw:
 
     @property
     def sentence(self) -> str:
-        """Text on the power law, such as "more loss, grows as f^0.8, independent of amplitude: acts like a damper".
+        """Text on the power law, such as "acts like a damper: more loss, grows as f^0.8, independent of amplitude".
 
         A phase, power or unit that the tests do not determine is left out.
         """
@@ -130,7 +130,7 @@ class PowerLaw:
         if not self.of_one_place and len(measures) < len(_MEASURES):
             parts.append(" or ".join(_MEASURES[measure] for measure in measures))
         like = self._known_law() if all(self.determined) else ""
-        return ", ".join(parts or ["these tests do not determine its form"]) + (f": acts like {like}" if like else "")
+        return f"acts like {like}: " * bool(like) + ", ".join(parts or ["these tests do not determine its form"])
 
     def _known_law(self) -> str:
         """Name of the element (spring, damper, ...) with nearly the phase and powers of this law; "" without one."""

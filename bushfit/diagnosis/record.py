@@ -34,8 +34,6 @@ if TYPE_CHECKING:
 
 #: Probability above which no further digits are shown.
 _NEARLY_ONE = 0.995
-#: Meaning of the probability of an explanation.
-_MEANING = "Each probability includes the case that further causes are present."
 #: Probability below which other explanations are not mentioned.
 _LEAST_REPORTED = 0.01
 
@@ -332,7 +330,7 @@ def format_odds(document: Mapping[str, Any]) -> list[str]:
         lines.append(f"probability {format_probability(rest)}: other explanations together")
     if lines and document["nothing"] > _LEAST_REPORTED:
         lines.append(f"Probability that nothing is missing: {format_probability(document['nothing'])}.")
-    return [*lines, *([_MEANING] if lines else [])]
+    return lines
 
 
 def level_of(name: str) -> str:

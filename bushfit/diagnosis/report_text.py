@@ -111,7 +111,7 @@ class DiagnosisWriter:
                 advice = _LEVELS_ADVICE if first.best.levels else get_effect(UNNAMED).confirmed_by
             entries += [NamedCause(UNNAMED, gap.evidence)] if gap else []
         rest = [part.name for part in first.faulty_parts] + [LEVELS] * first.best.levels
-        rest += [f"{NAMELESS} ({gap.sentence})" if gap else NAMELESS] * bool(gap or first.unnamed)
+        rest += [f"{NAMELESS}, {gap.sentence}" if gap else NAMELESS] * bool(gap or first.unnamed)
         faulty = first.best if first.faulty_parts else None
         return self._build(closing, summary, entries, rest, places=faulty, next_test=advice)
 

@@ -11,6 +11,7 @@ from bushfit.caveat import Caveat
 from bushfit.effects import Branch, Effect, Level, Modifier, place_suffix, qualified_name
 from bushfit.effects.contract import RubberConditions
 from bushfit.effects.unnamed import NAME as UNNAMED
+from bushfit.effects.unnamed import effect_label
 from bushfit.errors import ModelError
 from bushfit.export.contract import ExportRequest
 from bushfit.export.deck import band_omissions
@@ -222,7 +223,7 @@ def _steady_omissions(
         return
     unit, factor = place.display.displacement
     point = f"{number(frequency, 3)} Hz and {number(factor * amplitude, 3)} {unit}"
-    parts = [f"{', '.join(fixed)}, fixed as at {point}" if fixed else "", ", ".join(omitted)]
+    parts = [f"{', '.join(fixed)}, fixed as at {point}" if fixed else "", ", ".join(map(effect_label, omitted))]
     effects = "; ".join(filter(None, parts))
     sentence = f"{effects}: error of the stiffness up to {number(100.0 * error, 2)} % over the grid"
     yield Caveat("format_error", sentence).about(place)

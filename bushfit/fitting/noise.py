@@ -45,7 +45,7 @@ LineKey = tuple[str, float]
 _ORIGINS = {
     "repeats": "from repeats",
     "stated": "stated in the campaign",
-    "assumed": "without repeats: scatter about a smooth curve; gain and phase assumed, see [rig] in a campaign",
+    "assumed": "no repeats: scatter about a smooth curve; gain and phase assumed, unless [rig] states them",
 }
 
 
@@ -91,11 +91,11 @@ class SweepNoise:
 
     def describe(self) -> str:
         """Describe size and origin of the sweeps' noise in one line for reports."""
-        shared = f"{format_class_errors(self.shared)} shared by a run"
+        shared = f"{format_class_errors(self.shared)} for a whole run"
         if any(self.level):
-            shared += f", {format_class_errors(self.level)} by all repeats of a level"
+            shared += f", {format_class_errors(self.level)} for all repeats of a level"
         point = 100.0 * np.sqrt(np.mean(np.square(list(self.random.values()))))
-        return f"{point:.2g} % from point to point, {shared} ({_ORIGINS[self.origin]})"
+        return f"{point:.2g} % per point, and {shared} ({_ORIGINS[self.origin]})"
 
 
 def sweep_noise(sweeps: Sequence[Sweep], rig: RigSettings = UNSTATED) -> SweepNoise:

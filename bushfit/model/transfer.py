@@ -7,6 +7,7 @@ import numpy as np
 
 from bushfit.caveat import Caveat
 from bushfit.effects import Level
+from bushfit.effects.unnamed import effect_label
 from bushfit.geometry import Bushing, Direction
 from bushfit.model.model import Model
 from bushfit.model.result import Result
@@ -102,8 +103,8 @@ def transfer_compound(result: Result, bushing: Bushing) -> tuple[Result, Caveat]
         alternatives=tuple(replace(record, model=transfer(record.model)) for record in result.alternatives),
     )
     sentence = f"{bushing.name}: predicted from the compound of {result.name}; no bushing of this shape was tested"
-    if omitted := ", ".join(record.name for record in result.model.records if record.name not in model.effects):
-        sentence += f"; left out, because they belong to {result.name} or its rig: {omitted}"
+    if omitted := [effect_label(name) for name in result.model.effects if name not in model.effects]:
+        sentence += f"; left out, because they belong to {result.name} or its rig: {', '.join(omitted)}"
     if spread := factor_spread(result):
         elsewhere = with_factor(elsewhere, [*Direction], spread)
         sentence += f"; the bands include {number(100.0 * spread, 2)} % of stiffness, by which bushings differ"

@@ -175,7 +175,7 @@ def format_deviation(ratios: Array) -> str:
     Args:
         ratios: ratios of two stiffnesses at the same points, such as model over measurement, (n,).
     """
-    ends = [number(100.0 * end - 100.0, 2, "+") for end in (np.nanmin(ratios), np.nanmax(ratios))]
+    ends = [number(round(100.0 * end - 100.0, 9), 2, "+") for end in (np.nanmin(ratios), np.nanmax(ratios))]
     return f"{' to '.join(dict.fromkeys(ends))} %"
 
 

@@ -77,7 +77,7 @@ def si_column(table: Table, role: str, tested: Place, hint: str | None = None) -
         raise table.header_error(
             f"there is no column for the {label}",
             expected=f'a header such as "{label} [{example}]"',
-            hint=f"name the column in the campaign: {ways}",
+            hint=f"state in the campaign {ways}",
         )
     column = table.roles[role]
     if column.index in table.clocks:

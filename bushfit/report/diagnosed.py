@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from bushfit.diagnosis.document import DiagnosisFile
 from bushfit.diagnosis.record import Diagnosis, level_of
 from bushfit.effects import get_parameter
 from bushfit.fitting.preparation import MeasuredSweep
@@ -16,6 +17,23 @@ _MEASURED = re.compile(
     r"outlier$|(strain amplitude|(model )?"
     r"(displacement|rotation|strain|force|moment|stress|stiffness|modulus|loss factor)) \["
 )
+
+#: What the numbers may be used for, by the verdict of a diagnosis.
+_USES = {
+    "consistent": "The model agrees with the tests within their noise. Use the model within the tested range.",
+    "named": "Use the model, which includes the named effect, within the tested range.",
+    "ambiguous": "Use stiffness and loss within the tested range, with the whole band. Do not state one cause yet.",
+    "described": "Use stiffness and loss within the tested range, with the whole band. The cause is not known.",
+    "partly": "Use stiffness and loss within the tested range, with the whole band. Part of the gap is not explained.",
+    "unexplained": "Do not release these numbers: the model misses the tests, and the cause is not known.",
+}
+
+
+def permitted_use(document: DiagnosisFile) -> str:
+    """Sentence on what the numbers may be used for after a diagnosis (content of diagnosis.json)."""
+    if any(effect["correction"] for effect in document["effects"]):
+        return "Correct the record first: the numbers are those of the uncorrected tests."
+    return _USES[document["verdict"]]
 
 
 def gap_table(diagnosis: Diagnosis) -> pd.DataFrame:

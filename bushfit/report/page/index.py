@@ -99,11 +99,11 @@ def index_page(batch: BatchFile, folder: Path, base: str = "") -> str:
 
 
 def summarize_warnings(named: Sequence[tuple[str, str]]) -> str:
-    """Summarise warnings of one kind: parts, first warning, and the number of other texts.
+    """Summarise warnings of one kind: parts, and the warning of the first part.
 
     Args:
         named: name of the part and text of each warning.
     """
     names, lines = (list(dict.fromkeys(column)) for column in zip(*named, strict=True))
-    more = f" (and {len(lines) - 1} more of this kind)" if len(lines) > 1 else ""
-    return f"{names[0] if len(names) == 1 else f'{len(names)} parts'}: {lines[0]}{more}"
+    several = f"{len(names)} parts{', such as ' + names[0] if len(lines) > 1 else ''}"
+    return f"{names[0] if len(names) == 1 else several}: {lines[0]}"

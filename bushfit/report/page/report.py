@@ -22,6 +22,7 @@ from bushfit.model.result import Result
 from bushfit.prediction.caveats import agrees_within_noise, warnings_of
 from bushfit.prediction.stiffness import Prediction
 from bushfit.report import plots
+from bushfit.report.diagnosed import permitted_use
 from bushfit.report.page import render_page
 from bushfit.report.page.record import JOINT, MODELS, predict_tables, tested_tables
 from bushfit.report.page.svg import Picture, picture
@@ -102,6 +103,7 @@ def report_page(files: Sequence[ResultFile], date: str | None = None, folder: Pa
         "sizes": effect_sizes,
         "label": effect_label,
         "odds": format_odds(diagnosis) if diagnosis else [],
+        "use": permitted_use(diagnosis) if diagnosis else "",
         "pictures": pictures,
         "left_out": left_out,
         "rows": list(parameter_rows(result)),
