@@ -270,8 +270,8 @@ class Diagnosis:
     def _effect(self, named: NamedCause) -> EffectEntry:
         """Entry of diagnosis.json for a named effect or mistake, with its fitted parameters."""
         effect, model, covariance = get_candidate(named.name), self.result.model, self.result.covariance
-        fitted_values = {candidate.name: candidate.parameters for candidate in self.candidates}
-        values = model.values if named.name in model.effects else fitted_values.get(named.name, {})
+        models = [model, *(fit[0] for fit in self.odds.fits if fit)]  # the model to use, or else its explanation
+        values = next((fitted.values for fitted in models if named.name in fitted.effects), {})
         parameters: dict[str, SizeEntry] = {}
         for name, value in values.items():
             if effect_name_of(name) == named.name:

@@ -295,7 +295,7 @@ def check_one_level(sources: Sequence[TestSource], key: str, option_text: str) -
         raise MeasurementError(
             f"{option} applies to all these tests, and their names state different values",
             found=f"{option} {option_text}; " + ", ".join(f"{level} in {name}" for name, level in levels.items()),
-            expected="one value for all tests, or no such option",
+            expected="names with one value, or this option left out",
             hint=f"leave {option} out and write the value with its unit into each name, or state {key} for each test "
             "in the campaign",
         )

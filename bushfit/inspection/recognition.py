@@ -90,7 +90,7 @@ def recognize_table(file: Path, test_options: Mapping[str, Any]) -> tuple[Table,
         raise resonance.error(problem, kind=ResonanceTestError, expected=expected, hint=hint)
     if not opened:
         errors = [error for _, error in failed]
-        raise NoTestError(**vars(next((one for one in errors if one.problem != "there is no header"), errors[0])))
+        raise NoTestError(**vars(next((one for one in errors if one.problem != "there is no known header"), errors[0])))
     best, is_sweep = max(opened, key=lambda one: len(one[0].roles))
     for usual, failure in failed:
         if len(best.roles) <= max(1, len(Vocabulary(usual, {}).roles(best.headers))):

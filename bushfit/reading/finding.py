@@ -77,7 +77,7 @@ def find_table(
         raise table.header_error("there is only one column", expected=expected, hint=hint)
     if table.layout.headerless and not any(text.isdecimal() for text in columns.values()):
         hint = f"state the numbers of the columns and their units in the campaign: {_NUMBERED_COLUMNS}"
-        raise table.header_error("there is no header", found=None, expected=_EXPECTED_HEADER, hint=hint)
+        raise table.header_error("there is no known header", found=None, expected=_EXPECTED_HEADER, hint=hint)
     table = classify(table, vocabulary, columns, stated_units)
     essential = ({"displacement", "force"}, *map(set, PAIRS))
     present = next((pair for pair in essential if pair <= set(table.roles)), {"displacement", "force"})
