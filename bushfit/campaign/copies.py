@@ -38,8 +38,12 @@ def copied_points(sweeps: Sequence[Sweep]) -> dict[tuple[int, int], list[int]]:
     """
     runs: dict[tuple[int, Any], list[int]] = {}
     runs_at: defaultdict[object, set[tuple[int, Any]]] = defaultdict(set)
-    points = [[(sweep.direction, *point) for point in _rounded_points(sweep)] for sweep in sweeps]
+    points = list[list[tuple[Any, ...]]]()
     for index, sweep in enumerate(sweeps):
+        columns = sweep.frequency, sweep.amplitude_reached, sweep.stiffness.real, sweep.stiffness.imag
+        numbers = np.stack(columns, axis=1)  # rounded, so that equal data have equal numbers
+        scale = 10.0 ** (_DIGITS - 1 - np.floor(np.log10(np.maximum(np.abs(numbers), 1e-300))))
+        points.append([(sweep.direction, *point) for point in (np.round(numbers * scale) / scale).tolist()])
         for row, level in enumerate(zip(sweep.repeat.tolist(), sweep.held_value.tolist(), strict=True)):
             run = (index, level if sweep.stepped else None)
             runs.setdefault(run, []).append(row)
@@ -98,14 +102,6 @@ def without_copied_points(sweeps: Sequence[Sweep]) -> list[Sweep]:
             sweep = _with_note(sweep, note)
         remaining.append(sweep)
     return remaining
-
-
-def _rounded_points(sweep: Sweep) -> list[list[float]]:
-    """Frequency, amplitude and complex stiffness of each row of a sweep, rounded; equal data have equal numbers."""
-    stiffness = sweep.stiffness
-    numbers = np.stack([sweep.frequency, sweep.amplitude_reached, stiffness.real, stiffness.imag], axis=1)
-    scale = 10.0 ** (_DIGITS - 1 - np.floor(np.log10(np.maximum(np.abs(numbers), 1e-300))))
-    return (np.round(numbers * scale) / scale).tolist()
 
 
 def _used_once(first: AnyTest, copies: Sequence[AnyTest]) -> Caveat | None:

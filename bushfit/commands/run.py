@@ -102,7 +102,16 @@ def run(campaign: Campaign | PreparedCampaign, *, loss: Loss | None = None) -> R
     """
     data = prepare_tests(campaign, loss)
     static = fit_static(data) if data.loops else None
-    two_step, reason = _two_step(data)
+    two_step, reason = None, ""
+    if not (data.loops and data.sweeps):
+        reason = f"no {'sweeps' if data.loops else 'loops'}"
+    elif not data.free(FIVE):
+        reason = "every parameter is fixed"
+    else:
+        try:
+            two_step = fit_two_step(data)
+        except FitError as error:
+            reason = error.problem
     joint = fit(data)
     diagnosed = diagnose(data, joint=joint) if joint.result.fitted else None
     notes = diagnosed.diagnosis.notes if diagnosed else ()
@@ -132,15 +141,3 @@ def run(campaign: Campaign | PreparedCampaign, *, loss: Loss | None = None) -> R
     files.append(ResultFile("report", "page", partial(report_page, files)))
     document = {**documents, **to_entries(predicted.warnings)}
     return RunOutput(data, static, two_step, reason, joint, diagnosed, predicted, document, files, validations)
-
-
-def _two_step(data: PreparedCampaign) -> tuple[TwoStep | None, str]:
-    """Result of the paper's two-step procedure, or None and the reason why it is left out."""
-    if not (data.loops and data.sweeps):
-        return None, f"no {'sweeps' if data.loops else 'loops'}"
-    if not data.free(FIVE):
-        return None, "every parameter is fixed"
-    try:
-        return fit_two_step(data), ""
-    except FitError as error:
-        return None, error.problem
