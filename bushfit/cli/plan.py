@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -188,8 +188,7 @@ def _percents(rows: Mapping[str, Mapping[str, Any]], keys: Sequence[str]) -> lis
 def _print_effects(output: Output, document: PlanFile) -> None:
     """Print the smallest detectable amounts of effects with the plan and with the standard tests."""
     amounts_of = document["visible"]
-    ratios = {name: (row["standard"] or math.inf) / (row["planned"] or math.inf) for name, row in amounts_of.items()}
-    ranked = sorted(amounts_of.items(), key=lambda item: ratios[item[0]])
+    ranked = sorted(amounts_of.items(), key=lambda row: (row[1]["standard"] or inf) / (row[1]["planned"] or inf))
     printed = ranked if output.verbose else ranked[:_MOST_EFFECTS]
     title = (
         "smallest amount of an effect that the tests detect (probability 90 %, and above the errors of the rig): "

@@ -3,7 +3,8 @@
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from functools import partial
-from typing import Unpack
+from itertools import accumulate
+from typing import Any, Unpack
 
 import numpy as np
 import pandas as pd
@@ -17,7 +18,7 @@ from bushfit.geometry import default_places, get_places
 from bushfit.model.result import Result
 from bushfit.planning.campaign import campaign_toml
 from bushfit.planning.compound import guess_parameters
-from bushfit.planning.contract import Aim, Knowledge, PlanRequest, Test, operating_points
+from bushfit.planning.contract import Aim, Knowledge, PlanRequest, operating_points
 from bushfit.planning.knowledge import from_campaign, from_result, with_rig_class
 from bushfit.planning.plan import Plan
 from bushfit.planning.plan import plan as choose_tests
@@ -29,11 +30,6 @@ from bushfit.units import number
 PREDICTED = ("stiffness", "loss_factor")
 #: Name of the campaign file of a plan, which `simulate` takes.
 CAMPAIGN_FILE = "campaign.toml"
-#: Columns of the sheet of tests; a plan without tests has them too.
-_COLUMNS = (
-    *("order", "direction", "test", "amplitude", "frequency [Hz]", "cycles", "repeat", "force up to", "minutes"),
-    *("minutes so far", "what for"),
-)
 
 
 def plan(
@@ -135,30 +131,29 @@ def plan_sheet(plan: Plan) -> pd.DataFrame:
     Returns:
         Table of texts, with durations [min].
     """
-    counts, repeats, rows = Counter(plan.tests), Counter[Test](), []
-    minutes = 0.0
-    for order, (test, run) in enumerate(zip(plan.tests, plan.document["tests"], strict=True), start=1):
-        repeats[test] += 1
-        minutes += run["minutes"]
+    tests, runs, model = plan.tests, plan.document["tests"], plan.knowledge.model
+    counts, minutes = Counter(tests), [run["minutes"] for run in runs]
+    amplitudes, frequencies, forces = list[str](), list[str](), list[str]()
+    for test in tests:
         (frequency, amplitude), (length, force, _) = operating_points(test), test.direction.display
-        stiffness = np.abs(plan.knowledge.model.stiffness(test.direction, frequency, amplitude))
-        largest = number(force.factor * float(np.max(stiffness * amplitude)), 2)
-        rows.append(
-            {
-                "order": order,
-                "direction": run["place"],
-                "test": f"sweep over {run['stepped']}" if run["kind"] == "sweep" else "loop",
-                "amplitude": f"{_distinct(length.factor * amplitude)} {length.name}",
-                "frequency [Hz]": _distinct(frequency),
-                "cycles": "until steady" if run["cycles"] is None else str(run["cycles"]),
-                "repeat": f"{repeats[test]} of {counts[test]}",
-                "force up to": f"{largest} {force.name}",
-                "minutes": round(run["minutes"], 1),
-                "minutes so far": round(minutes, 1),
-                "what for": plan.purposes[test],
-            }
-        )
-    return pd.DataFrame(rows, columns=_COLUMNS)
+        largest = float(np.max(np.abs(model.stiffness(test.direction, frequency, amplitude)) * amplitude))
+        amplitudes.append(f"{_distinct(length.factor * amplitude)} {length.name}")
+        frequencies.append(_distinct(frequency))
+        forces.append(f"{number(force.factor * largest, 2)} {force.name}")
+    columns: dict[str, Sequence[Any]] = {
+        "order": range(1, len(tests) + 1),
+        "direction": [run["place"] for run in runs],
+        "test": [f"sweep over {run['stepped']}" if run["kind"] == "sweep" else "loop" for run in runs],
+        "amplitude": amplitudes,
+        "frequency [Hz]": frequencies,
+        "cycles": ["until steady" if run["cycles"] is None else str(run["cycles"]) for run in runs],
+        "repeat": [f"{tests[: index + 1].count(test)} of {counts[test]}" for index, test in enumerate(tests)],
+        "force up to": forces,
+        "minutes": [round(duration, 1) for duration in minutes],
+        "minutes so far": [round(total, 1) for total in accumulate(minutes)],
+        "what for": [plan.purposes[test] for test in tests],
+    }
+    return pd.DataFrame(columns)
 
 
 def _distinct(values: Array) -> str:

@@ -80,9 +80,9 @@ def predict(
         UnitError: a preload that is neither a displacement nor a force of a direction.
     """
     result, directions = as_result(model), grid.get("directions")
+    preloaded = [tested.place for tested in result.measured.preloads] if preloads and result.measured else []
     if isinstance(bushing, str):
         of_bushing = [place for place in result.specimens if place.bushing and place.body == bushing]
-        preloaded = [tested.place for tested in result.measured.preloads] if preloads and result.measured else []
         default = [str(place) for place in of_bushing if str(place) in preloaded] or _DIRECTIONS
         directions = [str(place) for name in directions or default for place in get_places(name, of_bushing)]
     elif bushing:
@@ -96,9 +96,7 @@ def predict(
     if len(preloads) > 1 and (wide or mass):
         problem = "wide tables and resonances require a single preload"
         raise ModelError(problem, found=", ".join(preloads), expected="one, or none")
-    if preloads and not directions and result.measured:
-        directions = [tested.place for tested in result.measured.preloads] or None
-    settings = grid_settings({**grid, "directions": directions}, campaign)
+    settings = grid_settings({**grid, "directions": directions or preloaded}, campaign)
     specimens = {specimen.name: specimen for specimen in (*result.specimens, *(campaign.specimens if campaign else ()))}
     places = [place for name in settings.directions or () for place in get_places(name, [*specimens.values()])]
     places = places or default_places(result.model.bushing, [*specimens.values()])
