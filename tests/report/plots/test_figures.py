@@ -6,12 +6,12 @@ from unittest import mock
 import numpy as np
 import pytest
 from commandline import typing
-from matplotlib.colors import to_rgba
+from matplotlib.colors import to_hex, to_rgba
 from matplotlib.figure import Figure
 from paper import BUSHING, PARAMETERS
 from tries import some
 
-from bushfit.report.plots.style import fixed_settings
+from bushfit.report.plots.style import _SCALES, fixed_settings, styles
 
 CAMPAIGN = f"""
 {BUSHING.replace('"B"', '"A name that tells all that is known of the bushing and of its tests"')}
@@ -72,3 +72,13 @@ def test_levels_are_named_by_a_legend_or_a_colour_bar(tmp_path, count):
         legend = sweep[1].get_legend()
         assert legend
         assert len(legend.get_texts()) == count
+
+
+def test_curves_have_the_stored_colours_lines_and_markers(file_regression):
+    """For a few curves, as many as a legend names, and more."""
+    looks = {(palette, count): styles(count, palette) for palette in _SCALES for count in (2, 8, 9)}
+    lines = [
+        f"{key}: {[(to_hex(look.color), look.dashes, look.marker) for look in look_of]}"
+        for key, look_of in looks.items()
+    ]
+    file_regression.check("\n".join(lines) + "\n", encoding="utf-8")
