@@ -28,8 +28,8 @@ _IN_ORDER = 0.4
 #: Fewest distinct values of the stepped quantity if the order of rows decides; chosen: tables of three amplitudes are
 #: often sorted.
 _FEWEST_STEPS = 4
-#: Fewest points of a run whose levels are identified by their rank.
-_FEWEST_POINTS = 3
+#: Smallest number of levels that are identified by their rank.
+_FEWEST_LEVELS = 3
 
 
 class Runs(NamedTuple):
@@ -67,9 +67,11 @@ def runs_of(
     """
     levels = nominal(amplitude)
     if (levels == amplitude).all() and repeat is None:
-        levels = _by_frequency(frequency, amplitude)
+        levels = _by_rank(amplitude, _group_numbers(frequency), fewest_points=2)
     if (levels == amplitude).all():
-        levels = _by_rank(frequency, amplitude, repeat)
+        falls = np.append(False, (np.diff(amplitude) < 0.0) | (np.diff(frequency) != 0.0))
+        run = np.cumsum(falls) if repeat is None else _group_numbers(frequency, repeat)
+        levels = _by_rank(amplitude, run, fewest_points=1)
     repeats_frequency, repeats_level = (float(np.mean(np.diff(values) == 0.0)) for values in (frequency, levels))
     if max(repeats_frequency, repeats_level) < _LEAST_CONSTANT:
         steps = np.diff(frequency)
@@ -115,48 +117,27 @@ def nominal(amplitude: Floats) -> Floats:
     return amplitude
 
 
-def _by_frequency(frequency: Floats, amplitude: Floats) -> Floats:
-    """Nominal amplitude of each point, (n,), by ranking the levels at each frequency.
+def _by_rank(amplitude: Floats, group: NDArray[np.intp], *, fewest_points: int) -> Floats:
+    """Nominal amplitude of each point, (n,), by ranking the levels in each group of points.
 
-    All frequencies must have equally many levels of equally many points, and levels must not overlap; otherwise the
-    amplitudes are returned unchanged.
-    """
-    rank = np.empty(amplitude.size, dtype=np.intp)
-    shapes = set()
-    for rows in group_rows(frequency):
-        levels, rank[rows], counts = np.unique(nominal(amplitude[rows]), return_inverse=True, return_counts=True)
-        shapes.add((levels.size, counts.min(), counts.max()))
-        if len(shapes) > 1 or counts.min() != counts.max() or counts.max() < 2 or levels.size < _FEWEST_POINTS:
-            return amplitude
-    return _medians_if_separate(amplitude, rank)
-
-
-def _by_rank(frequency: Floats, amplitude: Floats, repeat: NDArray[np.int64] | None) -> Floats:
-    """Nominal amplitude of each point, (n,), by its rank in a run over the amplitudes at one frequency.
-
-    All runs must have equally many points, and levels must not overlap; otherwise, or if there is only one run, the
-    amplitudes are returned unchanged.
+    All groups must have equally many levels of equally many points, and levels must not overlap; otherwise, or if there
+    is only one group, the amplitudes are returned unchanged.
 
     Args:
-        frequency: frequency of each point [Hz], (n,).
         amplitude: reached amplitude of each point, (n,).
-        repeat: number of the repeat of each point, (n,); None if the file does not state it.
+        group: number of the group of each point, (n,): points at one frequency, or a run over the amplitudes.
+        fewest_points: smallest number of points at a level of a group; from 2 on, reached amplitudes form levels.
     """
-    falls = np.append(False, (np.diff(amplitude) < 0.0) | (np.diff(frequency) != 0.0))
-    run = np.cumsum(falls) if repeat is None else _group_numbers(frequency, repeat)
-    counts = np.bincount(run)
-    if counts.size < 2 or np.ptp(counts[counts > 0]) > 0 or counts.max() < _FEWEST_POINTS:
+    rank, shapes, groups = np.empty(amplitude.size, dtype=np.intp), set(), group_rows(group)
+    for rows in groups:
+        levels = nominal(amplitude[rows]) if fewest_points > 1 else amplitude[rows]
+        levels, rank[rows], counts = np.unique(levels, return_inverse=True, return_counts=True)
+        shapes.add((levels.size, counts.min(), counts.max()))
+    (level_count, fewest, most), *others = shapes
+    if others or len(groups) < 2 or level_count < _FEWEST_LEVELS or not fewest_points <= fewest == most:
         return amplitude
-    order = np.lexsort((amplitude, run))
-    rank = np.empty(order.size, dtype=np.intp)
-    rank[order] = np.tile(np.arange(counts.max()), order.size // counts.max())
-    return _medians_if_separate(amplitude, rank)
-
-
-def _medians_if_separate(amplitude: Floats, rank: NDArray[np.intp]) -> Floats:
-    """Replace each amplitude by the median of all points of its rank, (n,); unchanged if ranks overlap."""
-    levels = np.sort(amplitude[np.argsort(rank)].reshape(rank.max() + 1, -1), axis=1)
-    return _group_medians(amplitude, rank) if (levels[:-1, -1] < levels[1:, 0]).all() else amplitude
+    by_level = np.sort(amplitude[np.argsort(rank)].reshape(level_count, -1), axis=1)
+    return _group_medians(amplitude, rank) if (by_level[:-1, -1] < by_level[1:, 0]).all() else amplitude
 
 
 def group_rows(*keys: Floats) -> list[NDArray[np.intp]]:

@@ -17,7 +17,7 @@ _MOST_CELLS = 10_500_000
 #: Largest size of the unpacked sheets of a workbook [bytes]; chosen: 100 for each of these cells.
 _MOST_BYTES = 1 << 30
 #: Last cell of a sheet of an xlsx workbook, near the start of its XML.
-_DIMENSION = re.compile(rb'<(?:\w+:)?dimension ref="(?:[A-Z]+\d+:)?([A-Z]+)(\d+)"')
+_DIMENSION = re.compile(rb'<(?:\w+:)?dimension ref="(?:[A-Z]+\d+:)?([A-Z]+\d+)"')
 #: Cell with a formula but no value, as written by programs that do not compute formulas.
 _NOT_COMPUTED = re.compile(
     rb"(?:</(?:\w+:)?f>|<(?:\w+:)?f\b[^<>]*/>)\s*(?:<(?:\w+:)?v\s*/>|<(?:\w+:)?v>\s*</(?:\w+:)?v>)?\s*</(?:\w+:)?c>"
@@ -25,7 +25,7 @@ _NOT_COMPUTED = re.compile(
 #: Row of a sheet of an xlsx workbook that is hidden, by a user or a filter.
 _HIDDEN_ROW = re.compile(rb'<(?:\w+:)?row (?=[^>]*\bhidden="(?:1|true)")[^>]*\br="(\d+)"')
 #: Cell of a sheet of an xlsx workbook with one of several styles.
-_STYLED_CELL = r'<(?:\w+:)?c (?=[^>]*\bs="({styles})")[^>]*\br="([A-Z]+)(\d+)"'
+_STYLED_CELL = r'<(?:\w+:)?c (?=[^>]*\bs="({styles})")[^>]*\br="([A-Z]+\d+)"'
 #: Formats for percentages that all workbooks have, by their number.
 _PERCENTAGES = {"9": "0%", "10": "0.00%"}
 #: End of a number format that scales a number or shows a unit: "0.0%", "#,##0.0,", '0.0" kN/mm"'.
@@ -84,6 +84,8 @@ def _xml_of_sheets(data: bytes) -> tuple[dict[str, bytes], dict[str, tuple[float
     Raises:
         MeasurementError: sheets are too large, or have a very distant cell (the reader allocates all cells up to it).
     """
+    from xlsxwriter.utility import xl_cell_to_rowcol
+
     if not data.startswith(b"PK"):
         return {}, {}
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
@@ -98,9 +100,9 @@ def _xml_of_sheets(data: bytes) -> tuple[dict[str, bytes], dict[str, tuple[float
         )
     for name, content in contents.items():
         if match := _DIMENSION.search(content[:10_000]):
-            last_row, last_column = int(match[2]), _column_index(match[1].decode())
-            if (last_column + 1) * last_row > _MOST_CELLS:
-                raise _too_large(f"{last_row} rows of {last_column + 1} columns in {name}")
+            last_row, last_column = xl_cell_to_rowcol(match[1].decode())
+            if (last_column + 1) * (last_row + 1) > _MOST_CELLS:
+                raise _too_large(f"{last_row + 1} rows of {last_column + 1} columns in {name}")
     targets = {link.get("Id"): str(link.get("Target")).lstrip("/").removeprefix("xl/") for link in links}
     sheets = {
         str(sheet.get("name")): targets.get(next((text for key, text in sheet.items() if key.endswith("}id")), ""), "")
@@ -127,17 +129,11 @@ def _shown(code: str) -> tuple[float, str]:
 
 def _cells_with(styles: Mapping[str, tuple[float, str]], xml: bytes) -> Iterator[tuple[int, int, tuple[float, str]]]:
     """Yield row and column index of each cell of a sheet with one of these styles, and factor and unit of its style."""
+    from xlsxwriter.utility import xl_cell_to_rowcol
+
     pattern = _STYLED_CELL.format(styles="|".join(styles)).encode()
-    for style, letters, number in re.findall(pattern, xml) if styles else ():
-        yield int(number) - 1, _column_index(letters.decode()), styles[style.decode()]
-
-
-def _column_index(letters: str) -> int:
-    """Index of a column of a sheet, from 0, by its letters, such as "AB"."""
-    index = 0
-    for letter in letters:
-        index = 26 * index + ord(letter) - 64
-    return index - 1
+    for style, cell in re.findall(pattern, xml) if styles else ():
+        yield *xl_cell_to_rowcol(cell.decode()), styles[style.decode()]
 
 
 def _row(cells: Sequence[object]) -> list[str | float]:
