@@ -1,11 +1,10 @@
 """Search for the table of a test in a file: its part, layout, columns and rows."""
 
-import csv
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from bushfit.errors import MeasurementError
+from bushfit.errors import MeasurementError, error_location
 from bushfit.geometry import TRANSLATION, Motion
 from bushfit.reading.blocks import combined
 from bushfit.reading.classification import classify
@@ -99,19 +98,17 @@ def _locate(
         Rows and layout of each table: as it is written, and with its blocks in one table.
 
     Raises:
-        MeasurementError: a line or a quoted cell is far too long.
+        MeasurementError: a line is far too long.
     """
     key = tuple(columns.items()), tuple(stated_units.items())
     if key not in opened.located:
         vocabulary, stated = Vocabulary(ALL_COLUMNS, columns, stated_units), opened.stated
         located = opened.located[key] = []
-        try:
+        with error_location(opened.file):
             for source in opened.parts:
                 mark = "" if isinstance(source, Sheet) else DELIMITERS.get(stated.delimiter or "")
                 layout = source.layout or find_layout(source.head, vocabulary, mark, stated.header_line)
                 if not stated.header_line and (long := reshaped(source, layout, vocabulary)):
                     source, layout = long, find_layout(long.head, vocabulary, "")
                 located.append(((source, layout), combined(source, layout, vocabulary)))
-        except csv.Error as error:
-            raise MeasurementError("the table cannot be read", file=opened.file, found=str(error)) from error
     return opened.located[key]

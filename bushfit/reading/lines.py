@@ -14,7 +14,8 @@ _SUMMARIES = frozenset(map(plain, WORDS["rows_of"]["summary"]))
 #: Largest number of columns of a table; chosen: far more than a test has.
 MOST_COLUMNS = 1000
 #: Largest number of characters of a line; chosen: a longer line is not a row of a table.
-_LONGEST_LINE = 1 << 20
+LONGEST_LINE = 1 << 20
+csv.field_size_limit(LONGEST_LINE)
 _DIGIT = re.compile(r"\d")
 _COMMENT_SIGNS = ("#", "%", "//")
 #: Blanks between columns of cells with units, such as "5 Hz 0.1 mm": not behind a number without its unit.
@@ -23,6 +24,9 @@ _BETWEEN_QUANTITIES = re.compile(r"(?<=[^\d\s])\s+|\s+(?=[+-]?\.?\d)")
 WITH_UNIT = re.compile(
     rf"(?:±|\+/?-)?\s*(?P<number>[+-]?[\d.,]++(?:\s*+{EXPONENT})?+)\s*+(?P<unit>(?:[^\W\d]|[°%‰])[^;]{{0,20}})"
 )
+
+#: End of a row in a matrix of MATLAB.
+_END_OF_MATRIX_ROW = re.compile(r"\s*;\s*(?:\.{3})?$")
 
 #: A line of a text, or the cells of a row of a workbook: texts and numbers.
 Content = str | Sequence[str | float]
@@ -41,17 +45,12 @@ class Line(NamedTuple):
 
 
 def split(content: Content, delimiter: str) -> list[str]:
-    """Return the texts of the cells of a line, stripped of blanks and without empty cells at the end.
-
-    Raises:
-        csv.Error: the line or a quoted cell is far too long.
-    """
+    """Return the texts of the cells of a line, stripped of blanks and without empty cells at the end."""
     if not isinstance(content, str):
         return [cell if isinstance(cell, str) else repr(cell) for cell in content]
     text = content.rstrip(f" {delimiter}")
-    if len(text) > _LONGEST_LINE:
-        raise csv.Error(f"a line of {len(text)} characters")
     if delimiter == " ":
+        text = _END_OF_MATRIX_ROW.sub("", text)
         cells, quantities = text.split(), _BETWEEN_QUANTITIES.split(text.strip())
         if len(quantities) < len(cells) and len(quantities) > 1:
             found = [match["unit"] for match in map(WITH_UNIT.fullmatch, quantities) if match]

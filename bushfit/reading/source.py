@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import io
 import re
 import warnings
@@ -14,9 +13,10 @@ from typing import Any, NamedTuple
 
 from numpy.typing import NDArray
 
+from bushfit.errors import MeasurementError
 from bushfit.reading.files import CHUNK_BYTES, HEAD_BYTES
 from bushfit.reading.layout import MOST_HEAD_LINES, Layout
-from bushfit.reading.lines import Line, split
+from bushfit.reading.lines import LONGEST_LINE, Line, split
 from bushfit.reading.numerals import APOSTROPHES, BLANKS
 from bushfit.units import SIZES
 
@@ -144,9 +144,16 @@ class Text:
 
 
 def _non_empty_lines(data: io.BytesIO, after: int) -> Iterator[Line]:
-    """Non-empty lines of a stream whose first line has the number `after` + 1; closes the stream."""
+    """Non-empty lines of a stream whose first line has the number `after` + 1; closes the stream.
+
+    Raises:
+        MeasurementError: a line is far too long.
+    """
     with io.TextIOWrapper(data, encoding="utf-8", errors="replace") as text:
         for number, line in enumerate(text, start=after + 1):
+            if len(line) > LONGEST_LINE:
+                found = f"a line of {len(line)} characters"
+                raise MeasurementError("the table cannot be read", place=f"line {number}", found=found)
             if line.strip(" \t\r\n,;|^"):
                 yield Line(number, line.rstrip("\n"))
 
@@ -241,12 +248,5 @@ RowSource = Text | Sheet
 
 
 def cells_of(line: Line, delimiter: str) -> Sequence[str | float]:
-    """Return the cells of a line of text or row of a sheet; numbers of a sheet remain numbers.
-
-    Raises:
-        csv.Error: the line or a quoted cell is far too long; the message has the line number.
-    """
-    try:
-        return split(line.content, delimiter) if isinstance(line.content, str) else line.content
-    except csv.Error as error:
-        raise csv.Error(f"{error}, line {line.number}") from error
+    """Return the cells of a line of text or row of a sheet; numbers of a sheet remain numbers."""
+    return split(line.content, delimiter) if isinstance(line.content, str) else line.content

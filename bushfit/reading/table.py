@@ -1,6 +1,5 @@
 """Table of a test: rows as in the file, roles of the columns, numbers in SI, and errors that state a location."""
 
-import csv
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -13,7 +12,7 @@ from numpy.typing import NDArray
 
 from bushfit import units
 from bushfit.caveat import Caveat
-from bushfit.errors import MeasurementError
+from bushfit.errors import MeasurementError, error_location
 from bushfit.geometry import TRANSLATION, Motion
 from bushfit.reading.block_labels import find_lines_above, find_remarks
 from bushfit.reading.headers import Column, Vocabulary
@@ -151,7 +150,7 @@ class Table:
         """
         level, is_other_table = dict[int, str | float](), False
         vocabulary = Vocabulary(of_motion(self.names, self.motion))
-        try:
+        with error_location(self.file):
             for line in (block or self.source).lines(self.layout.lines_before_data):
                 if self.layout.numbered or not is_comment(line.content, self.layout.delimiter):
                     cells = cells_of(line, self.layout.delimiter)
@@ -167,8 +166,6 @@ class Table:
                             is_same = self.layout.is_header(texts, vocabulary) or self.layout.is_repeated(texts)
                             is_other_table = not is_same and (is_other_table or begins_other_table(texts))
                         yield line.number, cells, "other" if is_other_table else row_fault(self, cells)
-        except csv.Error as error:
-            raise self.error("the table cannot be read", found=str(error)) from error
 
     def parse(self, block: RowSource, indices: frozenset[int]) -> Mapping[int, Floats] | None:
         """Read columns of a block at once, in units of the file.
