@@ -34,8 +34,10 @@ from bushfit.reduction.programme import split_record
 from bushfit.units import CELSIUS, parse_quantity
 from bushfit.validation import validate_tables
 
+#: Endings of texts and workbooks.
+_TABLES = (".csv", ".txt", ".tsv", ".dat", ".asc", ".lvm", ".xls", ".xlsx", ".xlsm", ".xlsb", ".ods")
 #: Endings of test files, from which `bushfit init` writes a campaign.
-TEST_FILES = (".csv", ".txt", ".tsv", ".dat", ".asc", ".lvm", ".xls", ".xlsx", ".xlsm", ".xlsb", ".ods", *RECORDINGS)
+TEST_FILES = (*_TABLES, ".gz", *RECORDINGS)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from dataclasses import replace
-from itertools import groupby, islice
+from itertools import groupby, islice, zip_longest
 from typing import NamedTuple
 
 from bushfit import units
@@ -16,7 +16,7 @@ from bushfit.reading.layout import Layout
 from bushfit.reading.lines import WITH_UNIT, Line, is_comment, is_row, is_summary_row, is_units_row, split
 from bushfit.reading.names import NO_LABELS, labels_above
 from bushfit.reading.numerals import common_decimal, is_like_number, plainest_value
-from bushfit.reading.roles import PAIRS
+from bushfit.reading.roles import PAIRS, is_test
 from bushfit.reading.source import Channels, RowSource, Sheet, Text, cells_of
 
 #: Largest text that is searched for blocks without their own headers [bytes]; chosen: some 100,000 rows.
@@ -29,14 +29,23 @@ _NUMERIC = b"0123456789.,+-eEdD \t\r\n"
 _COMPLEX = re.compile(
     r"\(?\s*([+-]?[\d.,]+(?:[eEdD][+-]?\d+)?)\s*([+-]\s*[\d.,]+(?:[eEdD][+-]?\d+)?)\s*\*?\s*[ij]\s*\)?"
 )
+#: Magnitude with an angle in degrees: "612∠6.2°".
+_POLAR = re.compile(r"([+-]?\d[\d.,]*(?:[eE][+-]?\d+)?)\s*∠\s*([+-]?\d[\d.,]*)\s*°")
 #: Number with its uncertainty: "600 ± 3", "600 +/- 3", "600 (±3)", "600(3)".
 _UNCERTAIN = re.compile(r"([+-]?\d[\d.,]*)\s*(?:\(?\s*(?:±|\+/?-)\s*\d[\d.,]*\s*%?\)?|\(\d+\))")
-#: Name of a block in a header, with the number behind it: "K axial [N/mm]", "K*_S1", "tan d Part 1", "K* #2", "K 2".
-_NAME_OF_SIDE = re.compile(r"(?<![^\s_])(?=((?:[^\W\d_][^\W_]*[\s_])?#?\d|[^\W\d_][^\W_]*)(?![^\s_]))")
+#: Name of a block in a header, with the number behind it: "K axial [N/mm]", "K*_S1", "tan d Part 1", "K* #2", "K 2"; or
+#: its level: "Force 0.1 Hz [N]".
+_NAME_OF_SIDE = re.compile(
+    r"(?<![^\s_])(?=(\d+(?:[.,]\d+)?\s?(?:[^\W\d_]{1,3}|%)|(?:[^\W\d_][^\W_]*[\s_])?#?\d|[^\W\d_][^\W_]*)(?![^\s_]))"
+)
 #: Words for a set point, a deviation or a corrected value, which name no block.
 _STATISTICS = frozenset(map(plain, (*WORDS["qualifiers"]["not_measured"], *WORDS["qualifiers"]["processed"])))
 #: First rows that are searched for complex numbers and units; chosen: room for remarks.
 _FIRST = 8
+
+
+#: Column of a table: header, unit in the row of units, and cells.
+PlainColumn = tuple[str | None, str | None, Sequence[str | float]]
 
 
 class Segment(NamedTuple):
@@ -151,8 +160,8 @@ def _is_one_block(source: Text, layout: Layout) -> bool:
 def _find_sides(layout: Layout, vocabulary: Vocabulary) -> list[Side]:
     """Find the columns of several blocks side by side, which may share other columns.
 
-    The headers of the blocks are equal, or those of a sweep differ in a name: a direction, a part, the number of a
-    repeat, "before". Shared columns that contain the mean of the blocks are left out.
+    The headers of the blocks are equal, or those of a sweep, or of loops with a time each, differ in a name: a level, a
+    direction, a part, the number of a repeat, "before". Shared columns with the mean of the blocks are left out.
     """
     written = list(zip(layout.headers, layout.units, strict=True))
     columns = dict[str, dict[int, str]]()
@@ -179,7 +188,9 @@ def _find_sides(layout: Layout, vocabulary: Vocabulary) -> list[Side]:
         is_sweep = "frequency" in shared_roles and any(pairs) and len(roles) == len(names)
         are_equal = names == [layout.headers[index] for index in next(iter(sides.values()))]
         is_named = are_repeats or (len(names) > 1 and not next(iter(sides)).isdigit())
-        if len(sides) > 1 and len({*names}) == len(names) and (len(names) > 1 if are_equal else is_sweep and is_named):
+        is_loop = "time" in roles and is_test(roles)
+        is_side = len(names) > 1 if are_equal else (is_sweep and is_named) or is_loop
+        if len(sides) > 1 and len({*names}) == len(names) and is_side:
             return [Side(shared, [*by_index], names, name * (not are_equal)) for name, by_index in sides.items()]
     return []
 
@@ -265,54 +276,68 @@ def _stacked_blocks(source: RowSource, layout: Layout, vocabulary: Vocabulary) -
 
 
 def _with_plain_cells(source: RowSource, layout: Layout) -> tuple[RowSource, Layout]:
-    """Split cells with more than a number: a complex number into two columns, a unit off into the row of units.
+    """Split the columns whose cells contain more than a number each, see `_plain_columns`."""
+    width = len(layout.headers)
 
-    An uncertainty behind a number is left out, and so is a plus-minus sign before it.
+    def columns(lines: Iterable[Line]) -> Iterator[PlainColumn]:
+        """Header, unit and cells of each column of some rows; the header is None behind the last named column."""
+        rows = (cells_of(line, layout.delimiter) for line in lines)
+        cells = zip_longest(*([*row, *[""] * (width - len(row))] for row in rows), fillvalue="")
+        named = zip_longest(layout.headers, layout.units, cells)
+        return ((header, unit, column or ()) for header, unit, column in named)
 
-    A unit is split off if the first cells of a column have compatible units; the first is that of the column.
-    """
-    first = [cells_of(line, layout.delimiter) for line in islice(source.lines(layout.lines_before_data), _FIRST)]
-    headers, row_of_units = list(layout.headers), list(layout.units)
-    by_column = [[str(row[n]) for row in first if n < len(row) and row[n] != ""] for n in range(len(headers))]
-    is_complex = [any(map(_COMPLEX.fullmatch, texts)) for texts in by_column]
-    stated = [in_row or split_unit(header)[1] or "" for header, in_row in zip(headers, row_of_units, strict=True)]
-    unit_of = [_common_unit(texts, unit) for texts, unit in zip(by_column, stated, strict=True)]
-    is_uncertain = [
-        len(texts) > 0 and all(_UNCERTAIN.fullmatch(text) or text[0] == "±" for text in texts) for texts in by_column
-    ]
-    if not (any(is_complex) or any(unit_of) or any(is_uncertain)):
+    if not any(_plain_columns(*column) for column in columns(islice(source.lines(layout.lines_before_data), _FIRST))):
         return source, layout
-    lines = [(line.number, list(cells_of(line, layout.delimiter))) for line in source.lines(layout.lines_before_data)]
-    for index in reversed(range(len(headers))):
-        if unit := unit_of[index]:
-            row_of_units[index] = row_of_units[index] or unit
-        elif is_complex[index]:
-            name, unit_text, _ = split_unit(headers[index])
-            suffix = f" [{unit_text}]" if unit_text else ""
-            headers[index : index + 1] = [f"{name} real{suffix}", f"{name} imaginary{suffix}"]
-            row_of_units[index : index + 1] = [row_of_units[index]] * 2
-        elif not is_uncertain[index]:
-            continue
-        for _, cells in lines:
-            text = str(cells[index]) if index < len(cells) else ""
-            if is_uncertain[index]:
-                cells[index : index + 1] = [_UNCERTAIN.sub(r"\1", text).lstrip("± ")]
-            else:
-                cells[index : index + 1] = [_in_unit(text, unit)] if unit else _complex_parts(text)
-    layout = replace(layout, headers=tuple(headers), units=tuple(row_of_units))
-    if uncertain := [f'"{header}"' for header, is_one in zip(layout.headers, is_uncertain, strict=False) if is_one]:
-        note = Caveat(
-            "uncertainty_left_out", f"{', '.join(uncertain)}: plus-minus signs and uncertainties are left out"
-        )
-        layout = replace(layout, notes=(*layout.notes, note))
-    numbers, content = zip(*lines, strict=True)
-    return Sheet(source.sheet or "", content, numbers=numbers, above=source.head), layout
+    lines = list(source.lines(layout.lines_before_data))
+    parts = [part for column in columns(lines) for part in _plain_columns(*column) or [column]]
+    named = [(header, unit or "") for header, unit, _ in parts if header is not None]
+    headers, row_of_units = zip(*named, strict=True)
+    notes = layout.notes
+    if uncertain := [f'"{header}"' for header, _, cells in columns(lines[:_FIRST]) if _are_uncertain(cells)]:
+        sentence = f"{', '.join(uncertain)}: plus-minus signs and uncertainties are left out"
+        notes = (*notes, Caveat("uncertainty_left_out", sentence))
+    content = list(zip(*(cells for *_, cells in parts), strict=True))
+    sheet = Sheet(source.sheet or "", content, numbers=[line.number for line in lines], above=source.head)
+    return sheet, replace(layout, headers=headers, units=row_of_units, notes=notes)
 
 
-def _complex_parts(text: str) -> list[str | float]:
-    """Real and imaginary part of a complex number; any other text, and an empty cell."""
-    match = _COMPLEX.fullmatch(text)
-    return [match[1], re.sub(r"\s|^\+", "", match[2])] if match else [text, ""]
+def _plain_columns(header: str | None, unit: str | None, cells: Sequence[str | float]) -> list[PlainColumn]:
+    """Split a column whose cells contain more than a number each.
+
+    Args:
+        header, unit: name of the column, and its unit in the row of units; None behind the last named column.
+        cells: cells of the column.
+
+    Returns:
+        Two columns for complex numbers, and for magnitudes with an angle; or one column, whose units are split off (the
+        first of compatible units is that of the column), or which lacks plus-minus signs and uncertainties. An empty
+        list if the cells are plain.
+    """
+    if header is None:
+        return []
+    texts = list(map(str, cells))
+    first, (name, in_header, _) = [text for text in texts[:_FIRST] if text], split_unit(header)
+    if common := _common_unit(first, unit or in_header or ""):
+        return [(header, unit or common, [_in_unit(text, common) for text in texts])]
+    if _are_uncertain(cells):
+        return [(header, unit, [_UNCERTAIN.sub(r"\1", text).lstrip("± ") for text in texts])]
+    bracket = f" [{in_header}]" if in_header else ""
+    complex_names = (f"{name} real{bracket}", unit), (f"{name} imaginary{bracket}", unit)
+    for pattern, names in ((_COMPLEX, complex_names), (_POLAR, ((header, unit), ("phase", "deg")))):
+        if any(map(pattern.fullmatch, first)):
+            pairs = [match.groups() if (match := pattern.fullmatch(text)) else (text, "") for text in texts]
+            parts = zip(*pairs, strict=True)
+            return [
+                (*named, [re.sub(r"\s|^\+", "", part) for part in column])
+                for named, column in zip(names, parts, strict=True)
+            ]
+    return []
+
+
+def _are_uncertain(cells: Sequence[str | float]) -> bool:
+    """True if the first cells of a column have uncertainties behind, or plus-minus signs before, their numbers."""
+    first = [str(cell) for cell in cells[:_FIRST] if cell != ""]
+    return bool(first) and all(_UNCERTAIN.fullmatch(text) or text[0] == "±" for text in first)
 
 
 def _common_unit(texts: Sequence[str], stated: str) -> str:

@@ -4,10 +4,13 @@ import codecs
 import hashlib
 import html
 import io
+import lzma
 import re
 import unicodedata
+import zlib
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
+from importlib import import_module
 from pathlib import Path
 
 from bushfit.errors import BushfitError, MeasurementError, did_you_mean
@@ -19,6 +22,8 @@ _LARGEST_BYTES = 1 << 30
 HEAD_BYTES = 1 << 18
 #: Bytes that are checked at a time; chosen: few enough to fit in memory next to the file, enough to be fast.
 CHUNK_BYTES = 1 << 22
+#: Module of Python that unpacks a file, by its first bytes.
+_PACKED = {b"\x1f\x8b": "gzip", b"BZh": "bz2", b"\xfd7zXZ": "lzma"}
 #: Byte order marks with Python's name of the encoding. The mark of UTF-32 begins with that of UTF-16.
 _MARKS = (
     (codecs.BOM_UTF8, "utf-8-sig"),
@@ -99,6 +104,26 @@ def view_bytes(
     if data.isspace() or not data:
         raise kind("the file is empty", file=file, expected="text", hint="export it again")
     return data
+
+
+def unpack(data: bytes, file: Path) -> bytes:
+    """Return the content of a file that gzip, bzip2 or xz packed; the bytes of any other file are unchanged.
+
+    Raises:
+        MeasurementError: the packed file is damaged, or too large.
+    """
+    name = next((name for sign, name in _PACKED.items() if data.startswith(sign)), None)
+    if name is None:
+        return data
+    try:
+        with import_module(name).open(io.BytesIO(data)) as stream:
+            content = bytes(stream.read(_LARGEST_BYTES + 1))
+        if not 0 < len(content) <= _LARGEST_BYTES:
+            raise EOFError(f"{'no' if not content else 'too many'} bytes")
+    except (OSError, EOFError, zlib.error, lzma.LZMAError) as error:
+        hint = "copy or pack the file again"
+        raise MeasurementError("the packed file cannot be read", file=file, found=str(error), hint=hint) from error
+    return content
 
 
 def read_utf8(

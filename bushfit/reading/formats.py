@@ -1,4 +1,4 @@
-"""Recordings of MATLAB, TDMS, MDF, Parquet and Arrow, as groups of channels.
+"""Recordings of MATLAB, HDF5, TDMS, MDF, Parquet and Arrow, as groups of channels.
 
 Each reader takes the bytes of a file and its path, imports its library when it is called, and yields groups. The unit
 of a channel is "" if the file does not state it.
@@ -20,12 +20,12 @@ _MOST_VALUES = 1 << 28
 
 
 def matlab(data: bytes, _: Path) -> Iterator[Group]:
-    """Read the vectors and matrices of a MATLAB file as channels.
+    """Read the vectors and matrices of a MATLAB or HDF5 file as channels.
 
     Yields:
         A group for the variables of the file, and one for each struct.
     """
-    if data.startswith(b"MATLAB 7.3"):
+    if data.startswith((b"MATLAB 7.3", b"\x89HDF")):
         import h5py
 
         with h5py.File(io.BytesIO(data)) as content:
@@ -38,11 +38,11 @@ def matlab(data: bytes, _: Path) -> Iterator[Group]:
 
 
 def _from_hdf5(node: Any) -> Any:
-    """Convert a variable of a MATLAB 7.3 file (HDF5) to the form that scipy returns for older files.
+    """Convert a variable of an HDF5 file, such as MATLAB 7.3 writes, to the form that scipy returns for older files.
 
     Returns:
-        A dict for a struct, a list of dicts for an array of structs, a text, or an array; None for an empty array or
-        an object of a class, such as a table.
+        A dict for a struct or for an array with a unit, a list of dicts for an array of structs, a text, or an array;
+        None for an empty array or an object of a class, such as a table.
     """
     if getattr(node, "external", None) or getattr(node, "is_virtual", False):
         raise ValueError("its data are in other files")
@@ -61,7 +61,9 @@ def _from_hdf5(node: Any) -> Any:
         return "".join(map(chr, values.T.ravel()))
     if values.dtype == object:
         return [_from_hdf5(node.file[reference]) for reference in values.ravel()]
-    return np.squeeze((values["real"] + 1j * values["imag"] if values.dtype.names else values).T)
+    array = np.squeeze((values["real"] + 1j * values["imag"] if values.dtype.names else values).T)
+    unit = node.attrs.get("unit", node.attrs.get("units"))
+    return array if unit is None else {"Data": array, "Name": node.name.rpartition("/")[2], "Unit": unit}
 
 
 def _refuse_too_many(values: int) -> None:
@@ -81,6 +83,9 @@ def _in_struct(path: str, content: Mapping[str, Any]) -> Iterator[Group]:
         content: variables of the struct by name.
     """
     fields = {name: value for name, value in content.items() if not name.startswith("__")}
+    for name in [f"{name.removesuffix('_Data')}_Header" for name in fields if name.endswith("_Data")]:
+        if isinstance(header := fields.pop(name, None), Mapping):  # of a channel, as catman writes it
+            fields[name] = {**header, "Data": fields.pop(name.replace("_Header", "_Data"))}
     arrays = {name: value for name, value in fields.items() if isinstance(value, np.ndarray)}
     texts = [value for value in arrays.values() if value.dtype.kind in "UO" and value.ndim > 0]
     names_by_width = {rows.shape[-1]: _column_names(np.atleast_2d(rows)) for rows in texts}

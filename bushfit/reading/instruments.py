@@ -58,6 +58,7 @@ class Format(NamedTuple):
 #: Supported formats of recordings.
 _FORMATS = (
     Format("MATLAB", (".mat",), rb"MATLAB (?:5\.0|7\.3) MAT-file", matlab, _MATLAB_HINT),
+    Format("HDF5", (".h5", ".hdf5"), rb"\x89HDF", matlab),
     Format("TDMS", (".tdms",), rb"TDSm", tdms),
     Format("UFF", (".uff", ".unv"), rb" {4}-1 *\r?\n +\d+", uff, _UFF_HINT),
     Format("MDF", (".mf4", ".mdf"), rb"MDF     |UnFinMF ", mdf),

@@ -282,8 +282,6 @@ def _layout(
 ) -> Layout:
     """Layout of the table below a header, with its units row if there is one, and with columns that have no header.
 
-    In a file of pandas with a header of two levels, the names of the first columns are in the row of the units.
-
     Args:
         lines: non-empty lines at the start of the file.
         vocabulary: known column names.
@@ -291,78 +289,120 @@ def _layout(
         delimiter: character between cells.
         headers: header cells.
     """
-    units_line, row, number = None, [""] * len(headers), lines[index].number
-    if all(is_like_number(cell) for cell in headers) and len(headers) > 1:
-        return Layout(delimiter, tuple(map(str, range(1, len(headers) + 1))), number, tuple(row), None, headerless=True)
-    below = [(line.number, split(line.content, delimiter)) for line in _below(lines, index, delimiter)]
-    above = ((line.number, split(line.content, delimiter)) for line in reversed(lines[:index]))
-    described = [*takewhile(lambda one: one[1][0] and not is_like_number(one[1][0]), below)]
-    if not any(plain(cells[0]) in _DESCRIPTIONS for _, cells in described):
-        counted = [f"{number:g}" for number in map(plainest_value, below[0][1])] if below and len(headers) > 2 else []
-        described = below[:1] if counted == [str(n) for n in range(1, len(headers) + 1)] else []
-    of_units = [(line, cells) for line, cells in (*described, *above) if _is_labelled_units_row(cells, len(headers))]
-    directly_above = split(lines[index - 1].content, delimiter) if index else []
-    if of_units:
-        units_line, row = of_units[0][0], ["", *of_units[0][1][1:], *row][: len(headers)]
-    elif len(directly_above) == len(headers) and all(is_units_row([cell]) for cell in directly_above):
-        row = [cell.strip("[]() ") for cell in directly_above]
-    elif below:
-        cells = [cell.strip("[]() ") for cell in below[0][1]]
-        if delimiter == " " and isinstance(text := next(_below(lines, index, delimiter)).content, str):
-            wide = [cell.strip("[]() ") for cell in _below_headers(str(lines[index].content), text)]
-            cells = wide if len(wide) == len(headers) else cells
-        named = [vocabulary.heading(cell) for cell in cells]
-        if len(cells) <= len(headers) and is_units_row(cells):
-            units_line, row = below[0][0], [*cells, *row][: len(headers)]
-        elif any(named) and [*map(bool, named)] == [*map(bool, cells)] and not vocabulary.roles(headers[: len(cells)]):
-            units_line, headers = below[0][0], [*cells, *headers[len(cells) :]]
-    scaled = scales_above((split(line.content, delimiter) for line in lines[:index]), headers)
-    row = [scaled.get(n, unit) for n, unit in enumerate(row)]
-    below = below[len(described) :]
-    widths = {len(cells) for _, cells in below if is_row(cells)}
-    if described and widths == {len(headers) - 1}:  # the names of the rows have a column of their own
-        headers, row = headers[1:], row[1:]
-    may_be_decimal = delimiter == "," and not any("." in cell for _, cells in below for cell in cells)
-    if len(widths) == 1 and len(headers) < (width := widths.pop()) < 2 * len(headers) and not may_be_decimal:
-        # R writes no header for the names of rows, which come first
-        counts = [cells[0] for line, cells in below if line != units_line and is_row(cells)]
-        are_numbered = len(counts) > 2 and counts in [[str(n + start) for n in range(len(counts))] for start in (0, 1)]
-        first = are_numbered or any(not is_like_number(cell) for cell in counts)
-        unnamed = [""] * (width - len(headers))
-        headers, row = ([*unnamed, *headers], [*unnamed, *row]) if first else ([*headers, *unnamed], [*row, *unnamed])
-    described_line = described[-1][0] if described else 0
-    contents = [line.content for line in lines[index + 1 :] if line.number not in (units_line, *dict(described))]
-    numbered = bool(contents) and all(
-        _NUMBERED.match(next(filter(None, split(content, delimiter)), "")) for content in contents
-    )
-    levels = stated_once(headers, (split(content, delimiter) for content in contents), vocabulary)
-    notes: list[Caveat] = []
-    if levels:
-        names = ", ".join(f'"{headers[index]}"' for index in sorted(levels))
-        notes.append(Caveat("cells_filled", f"{names}: an empty cell has the value of the cell above"))
-    if scaled:
-        scales = ", ".join(f'"{headers[n]}" {text}' for n, text in scaled.items())
-        notes.append(
-            Caveat("stated_unit", f"the lines above the table scale its columns: {scales}; offsets are left out")
+    number, width = lines[index].number, len(headers)
+    if all(is_like_number(cell) for cell in headers) and width > 1:
+        names = tuple(str(column) for column in range(1, width + 1))
+        return Layout(delimiter, names, number, ("",) * width, None, headerless=True)
+    layout = Layout(delimiter, tuple(headers), number, ("",) * width, None)
+    above, below = lines[:index], list(_below(lines, index, delimiter))
+    layout = _with_units(layout, _descriptions(below, delimiter, width), above, below, lines[index], vocabulary)
+    if scales := scales_above((split(line.content, delimiter) for line in above), layout.headers):
+        listed = ", ".join(f'"{layout.headers[n]}" {text}' for n, text in scales.items())
+        note = Caveat("stated_unit", f"the lines above the table scale its columns: {listed}; offsets are left out")
+        row = tuple(scales.get(n, unit) for n, unit in enumerate(layout.units))
+        layout = replace(layout, units=row, notes=(note,))
+    rows = [split(line.content, delimiter) for line in lines[index + 1 :] if line.number > layout.lines_before_data]
+    layout = _with_unnamed_columns(layout, rows[:_LINES_BELOW_HEADER])
+    numbered = bool(rows) and all(_NUMBERED.match(next(filter(None, cells), "")) for cells in rows)
+    if levels := stated_once(layout.headers, rows, vocabulary):
+        filled = ", ".join(f'"{layout.headers[column]}"' for column in sorted(levels))
+        note = Caveat("cells_filled", f"{filled}: an empty cell has the value of the cell above")
+        layout = replace(layout, levels=levels, notes=(note, *layout.notes))
+    return replace(layout, numbered=numbered)
+
+
+def _descriptions(below: Sequence[Line], delimiter: str, width: int) -> list[Line]:
+    """Find the rows that describe the columns, such as their types, between a header and its units or its first row.
+
+    Args:
+        below: first lines below the header.
+        delimiter: character between cells.
+        width: number of columns.
+
+    Returns:
+        Rows with names such as "Unit" and "dx" in the first cell; or else rows above the units that are not data, and a
+        row that counts the columns.
+    """
+
+    def cells(line: Line) -> list[str]:
+        return split(line.content, delimiter)
+
+    def is_counted(line: Line) -> bool:
+        return width > 2 and [f"{plainest_value(cell):g}" for cell in cells(line)] == list(
+            map(str, range(1, width + 1))
         )
-    return Layout(
-        delimiter,
-        tuple(headers),
-        number,
-        tuple(row),
-        units_line,
-        (),
-        numbered,
-        False,
-        tuple(notes),
-        levels,
-        described_line,
-    )
+
+    named = [*takewhile(lambda line: (first := cells(line)[0]) != "" and not is_like_number(first), below)]
+    if any(plain(cells(line)[0]) in _DESCRIPTIONS for line in named):
+        return named
+    before_rows = [*takewhile(lambda line: is_counted(line) or not is_row(cells(line)), below)]
+    units_row = max((n for n, line in enumerate(before_rows) if is_units_row(cells(line))), default=0)
+    return before_rows[:units_row] or [*takewhile(is_counted, before_rows)]
 
 
-def _is_labelled_units_row(cells: Sequence[str], width: int) -> bool:
-    """True if a row of at most `width` cells begins with a word such as "Unit", and half of the others are units."""
-    return 1 < len(cells) <= width and plain(cells[0]) in UNIT_NAMES and is_units_row(cells[1:])
+def _with_units(
+    layout: Layout,
+    descriptions: Sequence[Line],
+    above: Sequence[Line],
+    below: Sequence[Line],
+    header: Line,
+    vocabulary: Vocabulary,
+) -> Layout:
+    """Add the units of the columns from a row that is labelled "Unit", or from a row of units next to the header.
+
+    In a file of pandas with a header of two levels, the names of the first columns are in the row of the units.
+
+    Args:
+        layout: layout without units.
+        descriptions: rows below the header that describe the columns.
+        above: lines above the header.
+        below: first lines below the header.
+        header: line of the header.
+        vocabulary: known column names.
+    """
+    headers, empty = layout.headers, layout.units
+    layout = replace(layout, described_line=descriptions[-1].number if descriptions else 0)
+    for line in (*descriptions, *reversed(above)):
+        cells = split(line.content, layout.delimiter)
+        if 1 < len(cells) <= len(headers) and plain(cells[0]) in UNIT_NAMES and is_units_row(cells[1:]):
+            return replace(layout, units_line=line.number, units=("", *cells[1:], *empty)[: len(headers)])
+    directly_above = split(above[-1].content, layout.delimiter) if above else []
+    if len(directly_above) == len(headers) and all(is_units_row([cell]) for cell in directly_above):
+        return replace(layout, units=tuple(cell.strip("[]() ") for cell in directly_above))
+    for line in below[len(descriptions) :][:1]:
+        cells = [cell.strip("[]() ") for cell in split(line.content, layout.delimiter)]
+        if layout.delimiter == " " and isinstance(line.content, str):
+            wide = [cell.strip("[]() ") for cell in _below_headers(str(header.content), line.content)]
+            cells = wide if len(wide) == len(headers) else cells
+        are_named = [vocabulary.heading(cell) is not None for cell in cells]
+        if len(cells) <= len(headers) and is_units_row(cells):
+            return replace(layout, units_line=line.number, units=(*cells, *empty)[: len(headers)])
+        if any(are_named) and are_named == [*map(bool, cells)] and not vocabulary.roles(headers[: len(cells)]):
+            return replace(layout, units_line=line.number, headers=(*cells, *headers[len(cells) :]))
+    return layout
+
+
+def _with_unnamed_columns(layout: Layout, below: Sequence[Sequence[str]]) -> Layout:
+    """Add headers for columns that have none, such as the names of the rows that R writes first.
+
+    Args:
+        layout: layout with headers.
+        below: cells of the first rows below the units.
+    """
+    headers, row = layout.headers, layout.units
+    rows = [cells for cells in below if is_row(cells)]
+    widths = {len(cells) for cells in rows}
+    if layout.described_line and widths == {len(headers) - 1}:  # the names of the descriptions have their own column
+        return replace(layout, headers=headers[1:], units=row[1:])
+    may_be_decimal = layout.delimiter == "," and not any("." in cell for cells in below for cell in cells)
+    if len(widths) != 1 or not len(headers) < (width := widths.pop()) < 2 * len(headers) or may_be_decimal:
+        return layout
+    counts = [cells[0] for cells in rows]
+    are_numbered = len(counts) > 2 and counts in [[str(n + start) for n in range(len(counts))] for start in (0, 1)]
+    unnamed = ("",) * (width - len(headers))
+    if are_numbered or not all(map(is_like_number, counts)):
+        return replace(layout, headers=(*unnamed, *headers), units=(*unnamed, *row))
+    return replace(layout, headers=(*headers, *unnamed), units=(*row, *unnamed))
 
 
 def _below_headers(header: str, row: str) -> list[str]:

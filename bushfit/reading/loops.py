@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from bushfit.caveat import Caveat
-from bushfit.geometry import Place
+from bushfit.geometry import ROTATION, Place
 from bushfit.reading.finding import find_table
 from bushfit.reading.headers import LOOP_COLUMNS, Column
 from bushfit.reading.labelled import Rows, note_not_understood
@@ -19,7 +19,7 @@ from bushfit.reading.si_columns import quantity_above, si_column
 from bushfit.reading.source import LEAST_VALUE
 from bushfit.reading.stated import LoopFile
 from bushfit.reading.table import Table
-from bushfit.reading.times import DAY, are_day_numbers, sampling_rate_above, spread
+from bushfit.reading.times import DAY, HOUR, are_day_numbers, sampling_rate_above, spread
 
 #: Latest time of a record [s]; chosen: the year 5138 in seconds since 1970, or March 1973 in milliseconds.
 _LATEST_SECOND = 1e11
@@ -55,6 +55,10 @@ def read_loop(
     selected, degrees = rows_of_test(table, test, direction, values["force"].size)
     if selected.size < values["force"].size:
         values = {role: numbers[selected] for role, numbers in values.items()}
+    if direction.motion is ROTATION and np.ptp(turned := np.unwrap(values["displacement"]) - values["displacement"]):
+        values["displacement"] += turned
+        sentence = f'"{wanted["displacement"].header}" jumps by whole turns, which are left out'
+        notes += (Caveat("angle_unwrapped", sentence),)
     displacement, force = values["displacement"], values["force"]
     for role in ("displacement", "force"):
         if np.ptp(values[role][:FEWEST_LOOP_ROWS]) < LEAST_VALUE and np.ptp(values[role]) < LEAST_VALUE:
@@ -160,7 +164,8 @@ def time_column(table: Table, place: Place) -> Column:
 def increasing_time(table: Table, column: Column, time: Floats) -> tuple[Floats, tuple[Caveat, ...]]:
     """Correct a recorded time so that it increases from row to row.
 
-    Clock times continue after midnight, and rounded times that repeat are spread evenly.
+    Clock times continue after midnight, and those without hours after the full hour. Rounded times that repeat are
+    spread evenly.
 
     Args:
         table: table of the loop, for errors.
@@ -174,8 +179,8 @@ def increasing_time(table: Table, column: Column, time: Floats) -> tuple[Floats,
         MeasurementError: the time decreases or is constant, or its unit is in doubt.
     """
     if column.index in table.clocks:
-        days = np.cumsum(np.append(0.0, np.diff(time) < -0.5 * DAY))  # clock times fall back at midnight
-        time = time + DAY * days
+        turn = DAY if time.max() >= HOUR else HOUR  # clock times fall back at midnight, minutes at the full hour
+        time = time + turn * np.cumsum(np.append(0.0, np.diff(time) < -0.5 * turn))
         time = time - time[0]
     likelier = ("ms", "milliseconds since 1970", "") if time.size and time[0] > _LATEST_SECOND else None
     if column.scale == 1.0 and column.unit and are_day_numbers(time):
@@ -195,13 +200,13 @@ def increasing_time(table: Table, column: Column, time: Floats) -> tuple[Floats,
         return even, (Caveat("rows_spread", sentence),)
     steps = np.diff(time)[~stuck]
     rate = f"{1.0 / np.median(steps):.6g} Hz" if steps.size else "... Hz"
-    hint = f'if the rows are evenly spaced, sampling_rate = "{rate}" in the campaign replaces this column; '
-    hint += "if a column numbers the runs, bushfit init makes one loop of each run"
+    even_rows = f'if the rows are evenly spaced, sampling_rate = "{rate}" in the campaign replaces this column'
+    hint = f"{even_rows}; if a column numbers the runs, bushfit init makes one loop of each run"
     if "block" in table.headers:
         hint = 'this file has several blocks: rows = { block = "1" } in the campaign selects the first; '
         hint += "bushfit init uses all"
     elif np.all(np.diff(time) >= 0.0):
-        hint = "export the file again with more digits of the time"
+        hint = f"export the file again with more digits of the time; or, {even_rows}"
     elif steps.size and time[1:].min() <= time[0] + np.median(steps):
         hint = 'the time starts again: number the runs in a column "run", or write each run to a file of its own'
     table.refuse(np.append(False, stuck), column, "time does not increase", "a later time in each row", hint)

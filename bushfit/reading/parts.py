@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from bushfit.errors import MeasurementError, did_you_mean
-from bushfit.reading.files import join_quoted, sha256, to_utf8, view_bytes
+from bushfit.reading.files import join_quoted, sha256, to_utf8, unpack, view_bytes
 from bushfit.reading.instruments import format_of, read_parts, word_for_part
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.source import RowSource, Text
@@ -58,8 +58,9 @@ def open_file(file: Path, file_format: FileFormat) -> OpenedFile:
     Raises:
         MeasurementError: the file cannot be read, or has no part with this name.
     """
-    data, name = view_bytes(file, MeasurementError), file_format.sheet
-    checksum, recording = sha256(data), format_of(data, file)
+    packed, name = view_bytes(file, MeasurementError), file_format.sheet
+    checksum, data = sha256(packed), unpack(packed, file)
+    recording = format_of(data, file)
     parts = read_parts(data, file, recording) if recording else ()
     if not parts and name:
         expected = "a workbook, or a file with groups of channels"

@@ -102,7 +102,7 @@ def note_left_out(table: Table, rows: Sequence[FaultyRow], count: int) -> Iterat
         )
     in_doubt = [row for row in left_out if row[2] in ("doubtful", "word")]
     is_much = len(in_doubt) > _MOST_WORDS or sum(fault == "doubtful" for *_, fault in in_doubt) > 1
-    if is_much and len(in_doubt) > _MOST_LEFT_OUT * count:
+    if is_much and len(in_doubt) > _MOST_LEFT_OUT * count and not _are_between_samples(in_doubt):
         raise bad_row(table, *in_doubt[0][:2], len(in_doubt))
     if left_out:
         listed = [
@@ -113,6 +113,14 @@ def note_left_out(table: Table, rows: Sequence[FaultyRow], count: int) -> Iterat
         more = ", ..." if len(left_out) > _MOST_LISTED else ""
         rows_text = f"{len(left_out)} row{'s' * (len(left_out) > 1)}"
         yield Caveat("rows_left_out", f"{rows_text} left out, without data: {', '.join(listed)}{more}")
+
+
+def _are_between_samples(rows: Sequence[FaultyRow]) -> bool:
+    """True if each k-th row of the file is complete, because one of its channels was sampled more slowly."""
+    lines = np.array([line for line, *_ in rows])
+    complete = lines[1:][np.diff(lines) == 2]
+    are_alike = len({tuple(cell == "" for cell in cells) for _, cells, _ in rows}) == 1
+    return are_alike and complete.size > 2 and np.ptp(np.diff(complete)) == 0
 
 
 def _broken_rows(table: Table, rows: Sequence[FaultyRow]) -> list[tuple[int, int]]:
@@ -142,9 +150,9 @@ def bad_row(
     needed = [column for column in table.roles.values() if column.index in table.needed]
     bad = (one for one in needed if isinstance(cells[one.index], str) and not is_like_number(str(cells[one.index])))
     column = column or next(bad, None)
+    filled = next((n for n in range(len(cells), 0, -1) if cells[n - 1] != ""), 0)
     if column is None or len(cells) > len(table.headers) or (table.layout.delimiter == " " and cells[-1] == ""):
         commas = table.layout.delimiter == "," and not any("." in str(cell) for cell in cells)
-        filled = next((n for n in range(len(cells), 0, -1) if cells[n - 1] != ""), 0)
         return table.error(
             "the row does not match the header",
             line=line,
@@ -156,6 +164,11 @@ def bad_row(
     if cell == "" and isinstance(table.source, Sheet) and table.source.lacks_values():
         hint = "open it in a spreadsheet program and save it again"
         return table.error("the workbook has formulas whose values were not saved", hint=hint)
+    if count > 1 and filled <= column.index and next(table.rows(), None) is None:
+        found, expected = f"{filled} cells", f"{len(table.headers)} cells: {', '.join(table.headers)}"
+        hint = "add the column that is missing, or delete its name and unit from the file"
+        problem = "all rows have fewer cells than the header"
+        return table.error(problem, line=line, found=found, expected=expected, hint=hint)
     return table.error(
         "the cell is empty" if cell == "" else "this is not a finite number, or beyond the range of every rig",
         line=line,

@@ -140,7 +140,7 @@ def _by_rank(amplitude: Floats, group: NDArray[np.intp], *, fewest_points: int) 
     return _group_medians(amplitude, rank) if (by_level[:-1, -1] < by_level[1:, 0]).all() else amplitude
 
 
-def group_rows(*keys: Floats) -> list[NDArray[np.intp]]:
+def group_rows(*keys: Floats | NDArray[np.intp]) -> list[NDArray[np.intp]]:
     """Group n rows whose values agree in all keys, such as frequency and amplitude, (n,) each; return their indices."""
     group = _group_numbers(*keys)
     return np.split(np.argsort(group, kind="stable"), np.cumsum(np.bincount(group))[:-1])
@@ -160,6 +160,6 @@ def _group_medians(values: Floats, group: NDArray[np.intp]) -> Floats:
     return medians[group]
 
 
-def _group_numbers(*keys: Floats | NDArray[np.int64]) -> NDArray[np.intp]:
+def _group_numbers(*keys: Floats | NDArray[np.intp]) -> NDArray[np.intp]:
     """Group number of each row, from 0, (n,); rows that agree in all keys, (n,) each, are one group."""
     return np.unique(np.stack(keys), axis=1, return_inverse=True)[1].ravel()

@@ -16,7 +16,8 @@ from bushfit.reading.numerals import ALL_NUMERALS
 if TYPE_CHECKING:
     from bushfit.reading.table import Table
 
-DAY = 86_400.0
+#: Length of a day and of an hour [s].
+DAY, HOUR = 86_400.0, 3600.0
 #: Clock: 20:07:10.100, 07:10,5, 8:07:10 PM; a duration may follow "1 day, ".
 _CLOCK = re.compile(
     r"(?:(?P<days>\d+) days?,?\s+)?(?:(?P<h>\d{1,4}):)?(?P<m>\d{1,4}):(?P<s>\d{1,2}(?:[.,:]\d+)?)"
@@ -71,7 +72,7 @@ def clock(text: str) -> float | None:
         hours = hours % 12 + 12 * half.startswith("p")
     whole, _, rest = re.sub("[,:]", ".", match["s"]).partition(".")
     days += int(match["days"] or 0)
-    return DAY * days + 3600.0 * hours + 60.0 * int(match["m"]) + int(whole) + (float(f"0.{rest}") if rest else 0.0)
+    return DAY * days + HOUR * hours + 60.0 * int(match["m"]) + int(whole) + (float(f"0.{rest}") if rest else 0.0)
 
 
 def are_day_numbers(values: Floats) -> bool:
