@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,8 @@ from bushfit.reading.runs import group_rows
 from bushfit.reading.source import RowSource, Text
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from bushfit.reading.table import Table
 
 #: Smallest mean number of rows per distinct text in a column that assigns rows to tests; chosen: a row counter has one.
@@ -72,38 +74,27 @@ def column_texts(table: Table, *indices: int) -> Iterator[ColumnTexts]:
     Yields:
         Texts of the column with each index.
     """
-    blocks = [list(_distinct_cells(table, block, indices)) for block in table.blocks()] if indices else []
-    for column in zip(*blocks, strict=True):
-        number_by_text, parts = dict[str, int](), list[NDArray[np.intp]]()
-        for rows, distinct in column:
-            texts = [_text(cell).strip(" #") for cell in distinct]
-            numbers = [number_by_text.setdefault(text, len(number_by_text)) for text in texts]
-            parts.append(np.array(numbers, dtype=np.intp)[rows])
-        codes = np.concatenate(parts)
-        is_empty = codes == number_by_text.get("", -1)
-        codes = codes[np.maximum.accumulate(np.where(is_empty, 0, np.arange(codes.size)))]
-        yield ColumnTexts(list(number_by_text), codes)
+    import pandas as pd
+
+    blocks = [_cells_of_block(table, block, indices) for block in table.blocks()] if indices else []
+    for index in indices:
+        cells = pd.concat([frame[index] for frame in blocks], ignore_index=True)
+        texts = cells.map(lambda cell: _text(cell).strip(" #")).astype(object)
+        codes, distinct = pd.factorize(texts.mask(texts == "").ffill().fillna(""))
+        yield ColumnTexts(list(distinct), codes)
 
 
-def _distinct_cells(
-    table: Table, block: RowSource, indices: Sequence[int]
-) -> Iterator[tuple[NDArray[Any], NDArray[Any]]]:
-    """Find the distinct cells (texts or numbers) of columns in a block of rows.
-
-    Yields:
-        For each column, its distinct cells as the second item; as the first, the index of each row's cell among them,
-        (n,) for n rows of data.
-    """
+def _cells_of_block(table: Table, block: RowSource, indices: Sequence[int]) -> pd.DataFrame:
+    """Read columns of a block of rows as texts or numbers; the columns of the result are named by their indices."""
     import pandas as pd
 
     if isinstance(block, Text) and table.layout.delimiter != " " and not table.marks and b'"' not in block.data:
         is_clean, types = table.parse(block, table.needed) is not None, dict.fromkeys(indices, "category")
         frame = block.frame(table.layout, types, len(table.headers), ".") if is_clean else None
-        if frame is not None:
-            yield from (frame[index].factorize() for index in indices)
-            return
+        if isinstance(frame, pd.DataFrame):
+            return frame
     rows = [row for _, row in table.rows(block)]
-    yield from (pd.factorize(np.array([row[index] for row in rows], dtype=object)) for index in indices)
+    return pd.DataFrame({index: pd.Series([row[index] for row in rows], dtype=object) for index in indices})
 
 
 def _text(cell: str | float) -> str:

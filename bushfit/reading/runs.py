@@ -154,10 +154,9 @@ def _group_spans(values: Floats, group: NDArray[np.intp]) -> Floats:
 
 def _group_medians(values: Floats, group: NDArray[np.intp]) -> Floats:
     """Replace each value by the median of its group, (n,); `group` is the group number of each value, (n,)."""
-    ordered, counts = values[np.lexsort((values, group))], np.bincount(group)
-    starts = np.cumsum(counts) - counts
-    medians = (ordered[starts + (counts - 1) // 2] + ordered[starts + counts // 2]) / 2.0
-    return medians[group]
+    import pandas as pd
+
+    return np.asarray(pd.Series(values).groupby(group).transform("median"))
 
 
 def _group_numbers(*keys: Floats | NDArray[np.intp]) -> NDArray[np.intp]:

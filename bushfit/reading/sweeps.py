@@ -22,7 +22,7 @@ from bushfit.reading.parts import OpenedFile
 from bushfit.reading.preload import parse_preload
 from bushfit.reading.rejected import check_positive
 from bushfit.reading.roles import AGREEING_PAIRS, si_unit
-from bushfit.reading.runs import group_rows, runs_of
+from bushfit.reading.runs import runs_of
 from bushfit.reading.si_columns import si_column
 from bushfit.reading.stated import SweepFile
 from bushfit.reading.stiffness import check_stiffness, complex_stiffness, stiffness_pair, with_positive_loss
@@ -210,13 +210,11 @@ def _copied_rows(points: Sequence[Floats], values: Collection[Floats]) -> NDArra
         points: frequency and amplitude of each row, (n,) each.
         values: all numbers of each row, (n,) each.
     """
-    groups = group_rows(*points)
-    usual = np.median([rows.size for rows in groups])
-    copies = np.zeros(points[0].size, dtype=bool)
-    for rows in (rows for rows in groups if rows.size > usual):
-        numbers = np.stack([column[rows] for column in values])
-        copies[np.delete(rows, np.unique(numbers, axis=1, return_index=True)[1])] = True
-    return copies
+    import pandas as pd
+
+    groups = pd.DataFrame(dict(enumerate(points))).groupby([0, 1])
+    copied = pd.DataFrame(dict(enumerate(values))).duplicated()
+    return np.asarray(copied & (groups[0].transform("size") > groups.size().median()))
 
 
 def _repeat_numbers(table: Table, values: Mapping[str, Floats]) -> NDArray[np.int64] | None:
