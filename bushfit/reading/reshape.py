@@ -174,8 +174,8 @@ def _exchange_rows(source: RowSource, layout: Layout, vocabulary: Vocabulary) ->
     for above, rows in find_segments(lines, count_texts):
         table, group = list[list[str]](), ""
         for line in rows:
-            texts, numbers = list(map(str, line.content)), list(map(str, line.content[count_texts(line) :]))
-            texts = texts[: len(texts) - len(numbers)]
+            cells, first = list(map(str, line.content)), count_texts(line)
+            texts, numbers = cells[:first], cells[first:]
             group = texts[0] or group
             words = sorted(filter(None, (group, *texts[1:])), key=lambda text: bool(_LEVEL.fullmatch(text)))
             table.append([" ".join(f"[{word}]" if units.is_unit(word) else word for word in words), *numbers])

@@ -94,9 +94,7 @@ def _texts(column: pd.Series[Any], point: str) -> list[str]:
             return f"{value:z.7g}".replace(".", point)
         return escape_formula(value) if isinstance(value, str) else str(value)
 
-    codes, distinct = column.factorize()  # most columns of texts repeat a few; None and NaN have the code -1
-    texts = [*map(cell_text, distinct.tolist()), ""]
-    return [texts[code] for code in codes.tolist()]
+    return ["" if value is None or value != value else cell_text(value) for value in column.tolist()]
 
 
 @lru_cache(maxsize=4096)
