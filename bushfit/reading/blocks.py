@@ -180,12 +180,9 @@ def _find_sides(layout: Layout, vocabulary: Vocabulary) -> list[Side]:
         shared = [index for index in free if without_mean(split_unit(written[index][0])[0]) not in plain_names]
         are_repeats = next(iter(sides)).isdigit() and len(shared) < len(free)  # numbers beside their mean
         shared_roles = vocabulary.roles([layout.headers[index] for index in shared])
-        pairs = [
-            {*pair} <= roles | (shared_roles if are_repeats else set())
-            for pair in PAIRS
-            if pair[0] != "force_amplitude"
-        ]
-        is_sweep = "frequency" in shared_roles and any(pairs) and len(roles) == len(names)
+        available = roles | shared_roles if are_repeats else roles
+        has_stiffness = any({*pair} <= available for pair in PAIRS if pair[0] != "force_amplitude")
+        is_sweep = "frequency" in shared_roles and has_stiffness and len(roles) == len(names)
         are_equal = names == [layout.headers[index] for index in next(iter(sides.values()))]
         is_named = are_repeats or (len(names) > 1 and not next(iter(sides)).isdigit())
         is_loop = "time" in roles and is_test(roles)
@@ -250,7 +247,8 @@ def _stacked_blocks(source: RowSource, layout: Layout, vocabulary: Vocabulary) -
         has_letters = is_note(line) or any(map(_LETTER.search, cells))
         return not has_letters or (not is_note(line) and is_row(texts(line))) or None
 
-    def is_left_out(cells: Sequence[str]) -> bool:
+    def is_left_out(line: Line) -> bool:
+        cells = texts(line)
         return is_summary_row(cells) or is_units_row(cells) or layout.is_header(cells, vocabulary)
 
     def is_header(line: Line) -> bool:
@@ -263,7 +261,7 @@ def _stacked_blocks(source: RowSource, layout: Layout, vocabulary: Vocabulary) -
         between = [line for line in above if not is_header(line)]
         labels = between
         if blocks[-1].rows:  # below rows, a mean or a header with other names is no label, but a row to be left out
-            labels = [line for line in between if not is_left_out(texts(line))]
+            labels = [line for line in between if not is_left_out(line)]
         begins = bool(rows) and (len(between) < len(above) or labels_above(labels) != NO_LABELS)
         left_out = [line for line in between if not (is_note(line) or (begins and line in labels))]
         blocks[-1].rows.extend(left_out)
@@ -326,11 +324,8 @@ def _plain_columns(header: str | None, unit: str | None, cells: Sequence[str | f
     for pattern, names in ((_COMPLEX, complex_names), (_POLAR, ((header, unit), ("phase", "deg")))):
         if any(map(pattern.fullmatch, first)):
             pairs = [match.groups() if (match := pattern.fullmatch(text)) else (text, "") for text in texts]
-            parts = zip(*pairs, strict=True)
-            return [
-                (*named, [re.sub(r"\s|^\+", "", part) for part in column])
-                for named, column in zip(names, parts, strict=True)
-            ]
+            numbers, second = zip(*pairs, strict=True)
+            return [(*names[0], numbers), (*names[1], [re.sub(r"\s|^\+", "", part) for part in second])]
     return []
 
 

@@ -294,9 +294,8 @@ def _layout(
         names = tuple(str(column) for column in range(1, width + 1))
         return Layout(delimiter, names, number, ("",) * width, None, headerless=True)
     layout = Layout(delimiter, tuple(headers), number, ("",) * width, None)
-    above, below = lines[:index], list(_below(lines, index, delimiter))
-    layout = _with_units(layout, _descriptions(below, delimiter, width), above, below, lines[index], vocabulary)
-    if scales := scales_above((split(line.content, delimiter) for line in above), layout.headers):
+    layout = _with_units(layout, lines, index, vocabulary)
+    if scales := scales_above((split(line.content, delimiter) for line in lines[:index]), layout.headers):
         listed = ", ".join(f'"{layout.headers[n]}" {text}' for n, text in scales.items())
         note = Caveat("stated_unit", f"the lines above the table scale its columns: {listed}; offsets are left out")
         row = tuple(scales.get(n, unit) for n, unit in enumerate(layout.units))
@@ -340,27 +339,20 @@ def _descriptions(below: Sequence[Line], delimiter: str, width: int) -> list[Lin
     return before_rows[:units_row] or [*takewhile(is_counted, before_rows)]
 
 
-def _with_units(
-    layout: Layout,
-    descriptions: Sequence[Line],
-    above: Sequence[Line],
-    below: Sequence[Line],
-    header: Line,
-    vocabulary: Vocabulary,
-) -> Layout:
+def _with_units(layout: Layout, lines: Sequence[Line], index: int, vocabulary: Vocabulary) -> Layout:
     """Add the units of the columns from a row that is labelled "Unit", or from a row of units next to the header.
 
     In a file of pandas with a header of two levels, the names of the first columns are in the row of the units.
 
     Args:
         layout: layout without units.
-        descriptions: rows below the header that describe the columns.
-        above: lines above the header.
-        below: first lines below the header.
-        header: line of the header.
+        lines: non-empty lines at the start of the file.
+        index: index of the header in `lines`.
         vocabulary: known column names.
     """
-    headers, empty = layout.headers, layout.units
+    headers, empty, above = layout.headers, layout.units, lines[:index]
+    below = list(_below(lines, index, layout.delimiter))
+    descriptions = _descriptions(below, layout.delimiter, len(headers))
     layout = replace(layout, described_line=descriptions[-1].number if descriptions else 0)
     for line in (*descriptions, *reversed(above)):
         cells = split(line.content, layout.delimiter)
@@ -372,7 +364,7 @@ def _with_units(
     for line in below[len(descriptions) :][:1]:
         cells = [cell.strip("[]() ") for cell in split(line.content, layout.delimiter)]
         if layout.delimiter == " " and isinstance(line.content, str):
-            wide = [cell.strip("[]() ") for cell in _below_headers(str(header.content), line.content)]
+            wide = [cell.strip("[]() ") for cell in _below_headers(str(lines[index].content), line.content)]
             cells = wide if len(wide) == len(headers) else cells
         are_named = [vocabulary.heading(cell) is not None for cell in cells]
         if len(cells) <= len(headers) and is_units_row(cells):

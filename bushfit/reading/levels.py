@@ -39,6 +39,7 @@ class ConditionColumn:
         unit: degC, or the unit of the preload in the file.
         values: temperature or preload of each row of data in this unit, (n,).
         step: smallest step between two levels in this unit.
+        tolerance: largest difference of a row from the stated temperature or preload in this unit.
     """
 
     table: Table
@@ -46,6 +47,7 @@ class ConditionColumn:
     unit: str
     values: Floats
     step: float
+    tolerance: float
 
     @property
     def is_loop(self) -> bool:
@@ -70,11 +72,6 @@ class ConditionColumn:
     def is_near(self, value: float) -> NDArray[np.bool_]:
         """Mask of the rows, (n,), that belong to a stated temperature or preload, in the unit of the condition."""
         return np.abs(self.values - value) <= self.tolerance
-
-    @property
-    def tolerance(self) -> float:
-        """Largest difference of a row from the stated temperature or preload, in the unit of the condition."""
-        return self.step if self.unit == "degC" else self.step / 2.0
 
     def text(self, rows: NDArray[np.intp]) -> str:
         """Return the mean of some rows as a text, such as "23.0 degC" or "500 N"; `rows` are their indices."""
@@ -199,9 +196,10 @@ def read_condition(table: Table, role: str, motion: Motion) -> ConditionColumn |
     if role == "temperature" and not kelvin:
         si_column(table, role, Direction.AXIAL)  # raises the error, whatever the direction
     if kelvin:
-        return ConditionColumn(table, column, "degC", kelvin[0] * values + kelvin[1] - CELSIUS, SAME_TEMPERATURE)
+        degrees = kelvin[0] * values + kelvin[1] - CELSIUS
+        return ConditionColumn(table, column, "degC", degrees, SAME_TEMPERATURE, SAME_TEMPERATURE)
     step = _PRELOAD_STEP * float(np.abs(values).max(initial=0.0))
-    return ConditionColumn(table, column, column.unit or "", values, step)
+    return ConditionColumn(table, column, column.unit or "", values, step, step / 2.0)
 
 
 def _numbers(table: Table, column: Column) -> Floats:

@@ -1,13 +1,12 @@
 """Reshape tables without a column for each quantity into long tables.
 
 A quantity may have a row of its own ("f [Hz]; 1; 2; 5"), rows that name it in a column ("5 Hz; K*; 600; N/mm"), a block
-of its own below those of other quantities, or its name beside each number ("f=5 Hz K*=600 N/mm").
+of its own below those of other quantities.
 """
 
 from __future__ import annotations
 
 import re
-from collections import Counter
 from collections.abc import Sequence
 from itertools import islice, zip_longest
 
@@ -25,11 +24,6 @@ from bushfit.reading.source import Channels, RowSource, Sheet, cells_of
 _LEVEL = re.compile(r"(?<![\w.,])\d+(?:[.,]\d+)?\s?(?:[^\W\d]{1,3}|%)(?![^\W_])")
 #: Names of a column with the values of several quantities, which another column names.
 _VALUES = frozenset(map(plain, WORDS["rows_of"]["values"]))
-#: Name, number and unit, if any, in a line of a log: "f=5.00 Hz"; and smallest number of lines with the same names.
-_PAIR = re.compile(
-    r"([^\W\d][^\s=,;]*)\s?=\s?([+-]?\d[\d.,]*(?<!,)(?:[eE][+-]?\d+)?(?:\s?[^\s\d=,;][^\s=,;]*(?![^\s,;])(?!\s?=))?)"
-)
-_FEWEST_LINES = 3
 #: First rows that show whether a column names quantities; chosen: more than a test has channels.
 _FIRST_ROWS = 50
 
@@ -45,28 +39,13 @@ def reshaped(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> Sheet
     Returns:
         Sheet with a column for each quantity, below the lines above the table; None if the table has one already.
     """
-    if isinstance(source, Channels):
-        return None
-    if pairs := _spread_pairs(source, vocabulary):
-        return pairs
-    if not layout.headers or layout.headerless:
+    if isinstance(source, Channels) or not layout.headers or layout.headerless:
         return None
     return (
         _exchange_rows(source, layout, vocabulary)
         or _spread_names(source, layout, vocabulary)
         or _join_blocks(source, layout, vocabulary)
     )
-
-
-def _spread_pairs(source: RowSource, vocabulary: Vocabulary) -> Sheet | None:
-    """Make a row of each line of a log with the same names, such as "f=5.0 Hz A=0.1 mm", with a column for each."""
-    found = [_PAIR.findall(line.text) for line in source.head]
-    (names, count), *_ = Counter(tuple(name for name, _ in pairs) for pairs in found).most_common(1) or [((), 0)]
-    if count < _FEWEST_LINES or not is_test(vocabulary.roles(names)):
-        return None
-    above = [[line.text] for line, pairs in zip(source.head, found, strict=True) if len(pairs) < 2]
-    rows = [[text for _, text in pairs] for line in source.lines(0) if (pairs := _PAIR.findall(line.text))]
-    return Sheet(source.sheet or "", [*above, names, *(row for row in rows if len(row) == len(names))])
 
 
 def _spread_names(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> Sheet | None:

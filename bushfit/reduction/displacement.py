@@ -75,11 +75,9 @@ def prepare_displacements(
             _require_cycle(channel)
         if np.abs(ends[:, 0] - ends[:, 1]).sum() < 0.5 * np.abs(ends[:, 2] - ends[:, 1]).sum():
             channels = [replace(channel, displacement=channel.displacement[:-1]) for channel in channels]
-    return (
-        [_smooth_displacement(channel, lowpass, steady=steady) for channel in channels]
-        if lowpass is not None
-        else channels
-    )
+    if lowpass is None:
+        return channels
+    return [_smooth_displacement(channel, lowpass, steady=steady) for channel in channels]
 
 
 def prepare_record(record: Loop, lowpass: float | None = None) -> Loop:
