@@ -361,7 +361,7 @@ def _with_units(layout: Layout, lines: Sequence[Line], index: int, vocabulary: V
     directly_above = split(above[-1].content, layout.delimiter) if above else []
     if len(directly_above) == len(headers) and all(is_units_row([cell]) for cell in directly_above):
         return replace(layout, units=tuple(cell.strip("[]() ") for cell in directly_above))
-    for line in below[len(descriptions) :][:1]:
+    for line in (*descriptions[:1], *below[len(descriptions) :][:1]):
         cells = [cell.strip("[]() ") for cell in split(line.content, layout.delimiter)]
         if layout.delimiter == " " and isinstance(line.content, str):
             wide = [cell.strip("[]() ") for cell in _below_headers(str(lines[index].content), line.content)]

@@ -1,5 +1,6 @@
 """Files as laboratories write them, through the command line: read with the right values, or asked about."""
 
+import gzip
 import json
 import tomllib
 from collections.abc import Iterator, Mapping
@@ -116,6 +117,35 @@ def test_complex_numbers_recorded_over_time_are_refused(channel, tmp_path):
     scipy.io.savemat(tmp_path / "loop.mat", {**channels, channel: channels[channel] * (1.0 + 0.1j)})
     done = typing(tmp_path)("inspect", "loop.mat", "--direction", "axial", status=2)
     assert f'loop.mat: the channel "{channel}" holds complex numbers' in done.stderr
+
+
+@pytest.mark.parametrize("name", ["loop.csv.gz", "loop.h5", "catman.mat"])
+def test_packed_tables_and_channels_with_their_units(name, tmp_path):
+    channels = {"Zeit": (TIME, "s"), "Weg": (DISPLACEMENT, "mm"), "Kraft": (FORCE, "N")}
+    if name == "loop.csv.gz":
+        (tmp_path / name).write_bytes(gzip.compress((FILES / "plain_loop.txt").read_bytes()))
+    elif name == "loop.h5":
+        h5py = pytest.importorskip("h5py")
+        with h5py.File(tmp_path / name, "w") as file:
+            for channel, (values, unit) in channels.items():
+                file.create_dataset(channel, data=values).attrs["unit"] = unit
+    else:
+        content: dict[str, Any] = {}
+        for number, (channel, (values, unit)) in enumerate(channels.items(), start=1):
+            content |= {f"Channel_{number}_Header": {"SignalName": channel, "Unit": unit}}
+            content |= {f"Channel_{number}_Data": values}
+        scipy.io.savemat(tmp_path / name, content)
+    _, (test,) = inspected(tmp_path, name)
+    check(test, LOOP)
+
+
+def test_an_angle_that_begins_again_at_360_degrees(tmp_path):
+    angle = 5.0 * DISPLACEMENT % 360.0
+    table = pd.DataFrame({"Time [s]": TIME, "Angle [deg]": angle, "Torque [Nm]": FORCE})
+    table.to_csv(tmp_path / "loop.csv", index=False, float_format="%.9g")
+    document, (test,) = inspected(tmp_path, "loop.csv", direction="torsion")
+    assert any("jumps by whole turns" in sentence for sentence in document["files"][0]["odd"])
+    check(test, {"time": TIME, "displacement": np.radians(5.0 * DISPLACEMENT), "force": FORCE})
 
 
 def test_parts_side_by_side_and_date_cells_of_a_workbook(tmp_path):
