@@ -179,15 +179,12 @@ def format_deviation(ratios: Array) -> str:
     return f"{' to '.join(dict.fromkeys(ends))} %"
 
 
-def extrapolations(
-    result: Result, points: OperatingPoints, temperature: float | None = None, subject: str | None = None
-) -> Iterator[Caveat]:
+def extrapolations(result: Result, points: OperatingPoints, subject: str | None = None) -> Iterator[Caveat]:
     """Generate warnings for frequencies, strains and a temperature outside of the fitted range.
 
     Args:
         result: fitted result.
-        points: operating points of the prediction; their conditions are not used.
-        temperature: temperature of the prediction [K]; None for the reference temperature.
+        points: operating points of the prediction, with its temperature if the model depends on the temperature.
         subject: beginning of the warnings; None for the name of the direction.
 
     Yields:
@@ -196,9 +193,9 @@ def extrapolations(
     if result.measured is None:
         return
     subject = subject or str(points.place)
-    if temperature and (tested := result.measured.temperature):
-        predicted, *ends = (number(kelvin - CELSIUS, 3) for kelvin in (temperature, *tested))
-        if not tested[0] - SAME_TEMPERATURE <= temperature <= tested[1] + SAME_TEMPERATURE:
+    if (kelvin := points.conditions.temperature) is not None and (tested := result.measured.temperature):
+        predicted, *ends = (number(float(end) - CELSIUS, 3) for end in (kelvin, *tested))
+        if not tested[0] - SAME_TEMPERATURE <= kelvin <= tested[1] + SAME_TEMPERATURE:
             fitted = f"predicted at {predicted} degC, but fitted at {' to '.join(dict.fromkeys(ends))} degC only"
             sentence = f"{fitted}: extrapolated by the law of Williams, Landel and Ferry"
             yield Caveat("extrapolated_temperature", sentence).about(subject)

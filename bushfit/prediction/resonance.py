@@ -116,8 +116,8 @@ def predict_resonance(
     predicted, if_in_rig = shaken(bushings), shaken(rig_models[-1]) if rig_models else None
     near = np.abs(predicted.transmissibility) >= min(_NEAR_PEAK, predicted.peak[1])
     subject = f"{place}, resonance of {number(mass, 3)} kg"
-    points = OperatingPoints(place, frequency[near], predicted.amplitude[near])
-    warnings = [*unfitted_warnings(result, place), *extrapolations(result, points, temperature, subject)]
+    points = OperatingPoints(place, frequency[near], predicted.amplitude[near], conditions)
+    warnings = [*unfitted_warnings(result, place), *extrapolations(result, points, subject)]
     if result.alternatives:
         peaks = np.array([shaken(model).peak for _, model in alternative_models(result, rig=False)])
         (low, smallest), (high, largest) = peaks.min(axis=0), peaks.max(axis=0)

@@ -134,7 +134,7 @@ def time_response(
     force = envelope([_force(source, model, place, history, conditions) for source, model in models])
     unit_strain, tested = result.model.unit_strain(place), _tested_strains(result)
     response = TimeResponse(place, history, force, unit_strain, tested, conditions=conditions)
-    return replace(response, warnings=(*_warnings(result, response, sorted(left_out), temperature), *untimed))
+    return replace(response, warnings=(*_warnings(result, response, sorted(left_out)), *untimed))
 
 
 def _force(result: Result, model: Model, place: Place, history: History, conditions: RubberConditions) -> Band:
@@ -214,21 +214,20 @@ def _tested_strains(result: Result) -> tuple[float, float] | None:
     return result.measured.strain[1], max(2.0 * np.pi * strain * frequency for strain, frequency in ends)
 
 
-def _warnings(result: Result, response: TimeResponse, left_out: list[str], temperature: float | None) -> list[Caveat]:
+def _warnings(result: Result, response: TimeResponse, left_out: list[str]) -> list[Caveat]:
     """Warnings on a time response: directions and ranges that were not fitted, effects left out, and coarse sampling.
 
     Args:
         result: fitted result.
         response: predicted force over time.
         left_out: names of the effects that the response leaves out.
-        temperature: temperature of the rubber [K]; None for the reference temperature.
     """
     place, history, of_motion = response.direction, response.history, list[Caveat]()
     warnings = [*result.undecided, *unfitted_warnings(result, place)]
     if result.measured:
         largest = max(np.abs(history.value).max(), result.measured.strain[0] / response.unit_strain)
-        point = OperatingPoints(place, np.array([history.frequency]), np.array([largest]))
-        warnings += extrapolations(result, point, temperature)
+        point = np.array([history.frequency]), np.array([largest])
+        warnings += extrapolations(result, OperatingPoints(place, *point, response.conditions))
     if response.tested and (share := response.shares_beyond[1]):
         rate = (
             f"{number(np.abs(response.strain_rate).max(), 3)} 1/s, but fitted at up to {number(response.tested[1], 3)}"

@@ -117,8 +117,8 @@ def static_curve(
     conditions = rubber_conditions(result, place, temperature, preload)
     parts = [_forces(source, model, place, displacement, rate, conditions) for source, model in models]
     loading, unloading, mean, slope, secant = (envelope(bands) for bands in zip(*parts, strict=True))
-    point = OperatingPoints(place, np.array([rate / (4.0 * reach)]), np.array([reach]))
-    warnings = (*extrapolations(result, point, temperature, f"{place}, static curve"), *untimed)
+    point = OperatingPoints(place, np.array([rate / (4.0 * reach)]), np.array([reach]), conditions)
+    warnings = (*extrapolations(result, point, f"{place}, static curve"), *untimed)
     return StaticCurve(place, displacement, loading, unloading, mean, slope, secant, rate, warnings, conditions)
 
 

@@ -136,7 +136,7 @@ def predict(
         over.check_superposable(direction, frequency)
         both = np.array([over.frequency or frequency.min()]), np.array([abs(over.displacement) + amplitude.max()])
         subject = f"{direction}, with the large motion"
-        together = extrapolations(result, OperatingPoints(direction, *both), temperature, subject)
+        together = extrapolations(result, OperatingPoints(direction, *both, conditions), subject)
     else:
         models, untimed, together = candidates(result, rig=rig), [], iter(())
     predictions = [predict_with_model(source, model, points, over) for source, model in models]
@@ -176,8 +176,8 @@ def point_warnings(
     if measured is not None and agrees_within_noise(result, place):
         confirmed = np.isfinite(measured)
     if not confirmed.all():
-        points = OperatingPoints(place, prediction.frequency[~confirmed], prediction.amplitude[~confirmed])
-        yield from extrapolations(result, points, temperature)
+        points = prediction.frequency[~confirmed], prediction.amplitude[~confirmed]
+        yield from extrapolations(result, OperatingPoints(place, *points, prediction.conditions))
     requested = {"temperature": temperature, "preload": preload}
     conditions = {name for name, value in requested.items() if value is not None}
     effects = result.model.without(Level.INSTRUMENT).records

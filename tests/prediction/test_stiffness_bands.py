@@ -90,6 +90,14 @@ def swept(frequency: object, amplitude: object, **more: Any) -> Sweep:
     return Sweep("s.csv", more.pop("direction", Direction.AXIAL), f, x, np.full(f.size, 1e6 + 1e5j), **more)
 
 
+@pytest.mark.parametrize(("kelvin", "beyond"), [(None, True), (300.0, True), (343.0, False)])
+def test_the_default_temperature_is_extrapolated_too_if_all_tests_were_warmer(paper_model, kelvin, beyond):
+    measured = Range((1.0, 200.0), (1e-4, 1.0), ("axial",), (333.0, 353.0))
+    warm = Result(paper_model.with_effect("temperature"), measured=measured)
+    kinds = [warning.kind for warning in predict(warm, Direction.AXIAL, [10.0], [1e-4], temperature=kelvin).warnings]
+    assert ("extrapolated_temperature" in kinds) is beyond
+
+
 def test_default_grid_is_that_of_the_sweeps_in_the_direction_where_there_are_any(result):
     """Two that miss the same set point are one, in a file or in one file a frequency."""
     radial = swept([1.0, 80.0, 1.004, 20.0], [1e-3, 4e-4, 2e-4, 1e-3], direction=Direction.RADIAL)
