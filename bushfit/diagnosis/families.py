@@ -227,7 +227,7 @@ def _gain(
             used_rows |= rows
     if not disjoint:
         return None, None
-    plain = np.concatenate([prediction.residuals[:, 0] for prediction in disjoint], axis=1)
+    plain = np.concatenate([prediction.residuals for prediction in disjoint], axis=1)
     before, after = np.mean(np.square(plain), axis=1)
     slope = np.sum([prediction.noise_gradients[0] - prediction.noise_gradients[1] for prediction in disjoint], axis=0)
     error = 2.0 * _BEYOND_LINEAR * np.sqrt(max(1.0, min(before, after))) * float(np.linalg.norm(slope)) / plain.shape[1]

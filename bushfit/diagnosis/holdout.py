@@ -22,7 +22,7 @@ from bushfit.effects.contract import Array
 from bushfit.errors import FitError, ModelError
 from bushfit.fitting.agreement import LeaveOut
 from bushfit.fitting.coordinates import Bounds
-from bushfit.fitting.preparation import MeasuredSweep, MeasuredTest, split_by_kind
+from bushfit.fitting.preparation import MeasuredTest, split_by_kind
 from bushfit.fitting.problem import FitResult
 from bushfit.progress import track
 from bushfit.reading.measurement import Stepped
@@ -81,13 +81,11 @@ class HeldOut:
         part: description of the part.
         before: value without the added effects, in units of noise.
         after: value with the added effects, in units of noise.
-        whitened: values before and after, in units of noise and prediction error combined.
     """
 
     part: str
     before: float
     after: float
-    whitened: tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -126,16 +124,14 @@ class HoldOut:
         """Compute the root mean square residuals by part and over all parts.
 
         Args:
-            residuals: by name of the part, residuals of the models before and after (first axis), in units of noise,
-                and whitened by noise and prediction error (second axis), (2, 2, n).
+            residuals: by name of the part, residuals of the models before and after, in units of noise, (2, n).
             skipped: parts that could not be held out.
         """
         residuals = {name: pair for name, pair in residuals.items() if pair.size}  # one frequency has no top third
         if not residuals:
             return cls((), tuple(skipped))
-        figures = {name: _rms_values(pair) for name, pair in residuals.items()}
-        overall = _rms_values(np.concatenate(list(residuals.values()), axis=-1))
-        return cls(tuple(HeldOut(name, *values) for name, values in figures.items()), tuple(skipped), *overall[:2])
+        parts = tuple(HeldOut(name, *_rms_values(pair)) for name, pair in residuals.items())
+        return cls(parts, tuple(skipped), *_rms_values(np.concatenate(list(residuals.values()), axis=-1)))
 
 
 def hold_out(before: FitResult, after: FitResult, bounds: Bounds) -> HoldOut:
@@ -178,22 +174,17 @@ def predicted_parts(before: FitResult, after: FitResult, bounds: Bounds) -> tupl
     return predictions, skipped
 
 
-def _rms_values(pair: Array) -> tuple[float, float, tuple[float, float]]:
-    """Root mean square of residuals of two models in two units (noise, whitened), (2, 2, n).
-
-    Returns:
-        Values in units of noise before and after; and both whitened, in units of noise and prediction error.
-    """
-    (before, before_whitened), (after, after_whitened) = np.sqrt(np.mean(np.square(pair), axis=-1)).tolist()
-    return before, after, (before_whitened, after_whitened)
+def _rms_values(pair: Array) -> tuple[float, float]:
+    """Root mean square of the residuals of two models, (2, n)."""
+    before, after = np.sqrt(np.mean(np.square(pair), axis=-1)).tolist()
+    return before, after
 
 
 class Predicted(NamedTuple):
     """Residuals of a held-out part, predicted by two models from the other parts of the tests.
 
     Args:
-        residuals: for each model, the n residuals in units of noise, and whitened by the prediction error as well,
-            (2, 2, n).
+        residuals: for each model, the n residuals in units of noise, (2, n).
         noise_gradients: for each model, the derivatives of half the sum of squares of the residuals (in units of noise)
             with respect to the noise of each of the m residuals of all tests, (2, m); for the standard error of a
             comparison.
@@ -218,9 +209,8 @@ def _predict(fit: FitResult, leave_out: LeaveOut, part: HoldOutPart, bounds: Bou
         bounds: limits of parameters, for a fit to the remaining tests.
 
     Returns:
-        Residuals, in units of noise and whitened by the prediction error as well, (2, n), and derivatives of half the
-        sum of squares in units of noise with respect to the noise of each of the m residuals of all tests, (m,); or the
-        part with the reason why it is skipped.
+        Residuals in units of noise, (n,), and derivatives of half their sum of squares with respect to the noise of
+        each of the m residuals of all tests, (m,); or the part with the reason why it is skipped.
     """
     names, data_sets = fit.names, fit.data_sets
     of_tests = part.rows(data_sets)
@@ -238,28 +228,8 @@ def _predict(fit: FitResult, leave_out: LeaveOut, part: HoldOutPart, bounds: Bou
         leave_out = _leave_out(rest.reevaluate(rest.model, data_sets))
         if rest.stopped or leave_out.undetermined(rows).any():
             return failed
-    residuals = np.array(leave_out.predicted(rows, _clusters(data_sets, rows.size), stepped=is_step))
-    return residuals, leave_out.noise_gradient(rows, residuals[0])[: of_tests.size]
-
-
-def _clusters(data_sets: Sequence[MeasuredTest], count: int) -> Array:
-    """Number of the level or loop to which each of the tests' residuals belongs, (count,).
-
-    Residuals whose errors are correlated have the same number. Further residuals, of priors, have a number each.
-
-    Args:
-        data_sets: the tests.
-        count: number of residuals, with those of priors after those of the tests.
-    """
-    numbers, first = list[Array](), 0
-    for data_set in data_sets:
-        level = np.zeros(data_set.size // data_set.residuals_per_point, dtype=int)
-        if isinstance(data_set, MeasuredSweep):
-            level = np.unique(data_set.held_value, return_inverse=True)[1]
-        numbers.append(np.tile(first + level, data_set.residuals_per_point))
-        first += int(level.max()) + 1
-    of_tests = np.concatenate(numbers)
-    return np.concatenate([of_tests, first + np.arange(count - of_tests.size)])
+    residuals = leave_out.predicted(rows, stepped=is_step)
+    return residuals, leave_out.noise_gradient(rows, residuals)[: of_tests.size]
 
 
 def hold_out_parts(data_sets: Sequence[MeasuredTest]) -> list[HoldOutPart]:

@@ -318,10 +318,14 @@ class DiagnosisWriter:
 
 
 def _may_be_absent(name: str, result: Result) -> bool:
-    """True if an effect may be absent: its amount is neutral, or its 95 % interval contains the neutral amount."""
+    """True if an effect may be absent: its amounts are neutral, or their 95 % region contains the neutral amounts."""
     effect = get_effect(name)
-    amount, neutral = qualified_name(effect, effect.amount), effect.amount.neutral
-    if neutral is None or effect.replaces is not None or amount not in result.model.values:
+    neutral = {qualified_name(effect, p): p.neutral for p in effect.parameters if p.neutral is not None}
+    if effect.replaces is not None or not neutral or neutral.keys() - result.model.values.keys():
         return False
+    deviations = {key: result.model.values[key] - value for key, value in neutral.items()}
+    if len(neutral) > 1:  # all together: each alone is uncertain where the tests determine a combination of them
+        return result.covariance.may_be_zero(deviations)
+    ((amount, value),) = neutral.items()
     low, high = result.interval(amount) or (result.model.values[amount],) * 2
-    return low <= neutral <= high
+    return low <= value <= high

@@ -24,6 +24,8 @@ _Part = tuple[str, Any]
 _FAULT = "fault: "
 #: Probability of a hypothesis below which it changes no figure: thousands of hypotheses are merged in each round.
 _NEGLIGIBLE = 1e-12
+#: Conditions of a test, on which a smooth deviation of the compound does not depend.
+_CONDITIONS = ("temperature", "preload")
 #: Texts for the parts of an explanation that are no known effect.
 NAMELESS = "an unknown cause"
 LEVELS = "errors of levels beyond the class of the rig"
@@ -197,10 +199,14 @@ def _parts_of(hypothesis: Hypothesis) -> frozenset[_Part]:
     """List the parts of a hypothesis; hypotheses with equal parts are merged into one explanation.
 
     Effects of the rubber are not listed if a deviation of the compound, or errors of levels, could imitate them. A
-    curve without a name, or a pattern of faulty parts of the tests, is listed only if there is nothing else.
+    deviation, a function of frequency and strain, cannot imitate effects of temperature and preload. A curve without a
+    name, or a pattern of faulty parts of the tests, is listed only if there is nothing else.
     """
     nameless = Level.MATERIAL if hypothesis.compound_deviates or hypothesis.levels else None
-    parts: list[_Part] = [("effect", name) for name in hypothesis.effects if get_effect(name).level != nameless]
+    apart = () if hypothesis.levels else _CONDITIONS
+    effects = [(name, get_effect(name)) for name in hypothesis.effects]
+    shown = [name for name, effect in effects if effect.level != nameless or {*effect.depends_on} & {*apart}]
+    parts: list[_Part] = [("effect", name) for name in shown]
     pattern = is_pattern(hypothesis.faulty_parts)
     if not pattern:
         parts += [(f"{_FAULT}{part.family}", part.name) for part in hypothesis.faulty_parts]

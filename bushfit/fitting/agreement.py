@@ -85,33 +85,14 @@ class LeaveOut:
         change = self.coordinate_steps @ self._basis_step(rows)
         return None if np.abs(change).max(initial=0.0) > _LONGEST_STEP else change
 
-    def predicted(self, rows: Array, clusters: Array, *, stepped: bool = True) -> tuple[Array, Array]:
-        """Residuals of held-out rows, predicted by the fit to the other rows.
+    def predicted(self, rows: Array, *, stepped: bool = True) -> Array:
+        """Residuals of held-out rows in units of noise, (h,), predicted by the fit to the other rows.
 
         Args:
             rows: mask of the h held-out rows among all n rows, (n,); the other rows must determine all parameters.
-            clusters: index of the cluster of each row, (n,); misfits within a cluster are correlated.
             stepped: False if the fit already excludes the held-out rows.
-
-        Returns:
-            Residuals in units of noise, and residuals whitened by the error of the prediction as well, (h,) each.
-
-        Notes:
-            The residuals in units of noise have the covariance 1 + J C J^T, with the robust covariance C = A^-1 M A^-1
-            of the fit to the other rows, where M sums the scores of each cluster (Liang and Zeger 1986, sandwich). C is
-            never smaller, in any direction, than the covariance that noise alone causes.
         """
-        step, out = self._basis_step(rows) * stepped, self.basis[rows]
-        plain = self.residual[rows] + out @ step
-        remainder = self.residual + self.basis @ step
-        remainder[rows] = 0.0
-        pulls = np.zeros((int(clusters.max()) + 1, step.size))
-        np.add.at(pulls, clusters, self.basis * remainder[:, None])
-        root = np.linalg.inv(np.linalg.cholesky(self._information(rows)))
-        size, vectors = np.linalg.eigh(root @ pulls.T @ pulls @ root.T)
-        error = out @ root.T @ vectors * np.sqrt(np.maximum(size, 1.0))
-        directions, scale, _ = np.linalg.svd(error, full_matrices=False)
-        return plain, plain - directions @ ((1.0 - 1.0 / np.hypot(1.0, scale)) * (directions.T @ plain))
+        return self.residual[rows] + self.basis[rows] @ self._basis_step(rows) * stepped
 
     def noise_gradient(self, rows: Array, predicted: Array) -> Array:
         """Derivatives of half the sum of squared predicted residuals with respect to the noise of each row.

@@ -58,7 +58,8 @@ class MeasuredLoop(MeasuredBase):
             rig; also of the offset of its force, relative to half the force range.
         gain_weighs: True if the gain error, as for a class stated in [rig], is part of the noise by which residuals are
             weighted. If False, the gain error only widens the errors of fitted parameters.
-        first_harmonic_errs: True if the model error includes the first harmonic of the force.
+        first_harmonic_errs: True if the model error includes the first harmonic of the force. If False, a smooth error
+            replaces it, and the gain error of the rig, stated or assumed, takes its place.
 
         histories: histories of the motion by their extent, once computed; copies of the loop share them.
 
@@ -363,6 +364,7 @@ class MeasuredLoop(MeasuredBase):
         rows = self._whiten_rows(waves * (self._per_noise * self.half_range))
         if not self.first_harmonic_errs:
             rows[[0, _ERROR_HARMONICS]] = 0.0
+            rows[0] = self.gain_error / self.model_error * self._unit_gain
         return SharedErrors.from_columns(np.concatenate((rows, _ERROR_SIZES[:1, None] * self._unit_offset)))
 
     def noise_sensitivity(self, influence: Array) -> dict[Hashable, Array]:

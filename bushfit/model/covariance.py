@@ -74,18 +74,19 @@ class Covariance:
         """Sentence that names the parameters whose 95 % half-width is at least their value; "" if there are none.
 
         Parameters of the effect `preload` are coefficients of one curve and have no meaning alone. The effect is named
-        if the tests do not distinguish all of them together from zero (Wald's test).
-
-        Returns:
-            The sentence.
+        if all of them may be zero.
         """
-        curve = self.restricted([name for name in self.names if name.startswith("preload.")])
-        names = [name for name in self.names if name not in curve.names and self.half_widths[name] >= abs(values[name])]
-        deviations = np.linalg.lstsq(curve.root, np.array([values[name] for name in curve.names]))[0]
-        if curve.names and deviations @ deviations <= chdtri(len(curve.names), 0.05):
-            names.append("preload")
+        curve = {name: values[name] for name in self.names if name.startswith("preload.")}
+        names = [name for name in self.names if name not in curve and self.half_widths[name] >= abs(values[name])]
+        names += ["preload"] * (bool(curve) and self.may_be_zero(curve))
         unknown = ", ".join(names)
         return unknown and f"the tests do not determine {unknown} (95 % interval of ±100 % or more)"
+
+    def may_be_zero(self, values: Mapping[str, float]) -> bool:
+        """True if the estimates of some parameters [SI] do not differ from zero together, by Wald's test at 95 %."""
+        part = self.restricted([*values])
+        deviations = np.linalg.lstsq(part.root, np.array([values[name] for name in part.names]))[0]
+        return bool(deviations @ deviations <= chdtri(len(part.names), 0.05))
 
     def freedom(self, slopes: Array) -> Array:
         """Effective degrees of freedom of the variances of n quantities, (n,), for Student's t.

@@ -130,6 +130,8 @@ def test_bands_include_that_a_part_of_the_correction_belongs_to_the_rig(rubber, 
     assert result.model.unnamed
     assert min(shares) >= 0.9
     assert band.high[0] - band.low[0] < 0.15 * band.value[0]
+    loops = predict(result, Direction.AXIAL, [0.1], [4e-4, 1.2e-3]).stiffness
+    assert np.all(loops.high - loops.low > 0.01 * loops.value), "the gain of a loop has an error of 0.5 %"
     again = from_document(json.loads(json.dumps(to_document(result))))
     np.testing.assert_array_equal(predict(again, Direction.RADIAL, [45.0], [2e-4]).stiffness.high, band.high)
 

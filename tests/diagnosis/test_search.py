@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from rigged import (
+    FREQUENCIES,
     INERTIA,
     LEVELS,
     PLAN,
@@ -28,6 +29,7 @@ from rigged import (
 )
 
 from bushfit.campaign.campaign import Campaign
+from bushfit.campaign.simulated import SimulatedLoop, SimulatedSweep
 from bushfit.effects import BASE
 from bushfit.geometry import Bushing, Direction
 from bushfit.model.model import Model
@@ -52,6 +54,32 @@ def test_a_level_under_one_of_two_preloads_is_measured_again(measured, tamper, l
     diagnosis = asked(tamper(campaign))
     assert diagnosis.verdict == "unexplained"
     assert f"measure again: the axial level {level} mm at a preload of 500 N" in diagnosis.next_test
+
+
+@pytest.mark.parametrize(
+    ("levels", "loops", "seed"),
+    [((3e-4,), (), 1), ((3e-4,), (8e-4,), 5), ((), (2e-4, 1e-3), 4)],
+    ids=["level", "loop", "loops"],
+)
+def test_temperature_is_named_even_if_the_tests_determine_one_combination_of_its_parameters(
+    paper_model, levels, loops, seed
+):
+    """One level or one frequency cannot tell a softer rubber from a faster one."""
+    warm = paper_model.with_effect("temperature", {"temperature.softening": 0.006, "temperature.shift": 0.03})
+    degrees, of_loops = (283.15, 296.15, 313.15), (283.15, 296.15, 313.15) if not levels else (296.15,)
+    plan = replace(
+        PLAN,
+        repeats=1 if seed == 1 else 2,
+        gain_error=2e-3,
+        loops=tuple(
+            SimulatedLoop(Direction.AXIAL, x, 0.1, cycles=3, temperature=kelvin) for kelvin in of_loops for x in loops
+        ),
+        sweeps=tuple(
+            SimulatedSweep(Direction.AXIAL, levels, FREQUENCIES, temperature=kelvin) for kelvin in degrees if levels
+        ),
+    )
+    diagnosis = asked(measure(undisturbed(warm, plan), replace(plan, seed=seed)).campaign())
+    assert "temperature" in names(diagnosis)
 
 
 @pytest.mark.parametrize(
