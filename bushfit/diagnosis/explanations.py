@@ -32,9 +32,9 @@ class Group:
     covered_rows: tuple[slice, int] | None = None
 
     @property
-    def row_count(self) -> int:
-        """Number n of all residuals."""
-        return self.covered_rows[1] if self.covered_rows else self.columns.shape[1]
+    def rows(self) -> slice:
+        """Slice of the residuals that `columns` changes."""
+        return self.covered_rows[0] if self.covered_rows else slice(0, self.columns.shape[1])
 
     @property
     def whole(self) -> Array:
@@ -48,15 +48,15 @@ class Group:
 
     @property
     def scaled(self) -> Array:
-        """Changes of all n residuals by each of the c columns, (c, n), scaled so that one prior suits all amounts.
+        """Changes of the residuals in `rows` by each of the c columns, scaled so that one prior suits all amounts.
 
         If only one of the columns acts, each is divided by its relative change of |K|: an amount of 1 then changes |K|
         by 100 %. A column that does not change |K| becomes zero. Columns that act together are not scaled.
         """
         if self.act_together:
-            return self.whole
+            return self.columns
         visible = self.unit > _UNSEEN
-        return self.whole * np.where(visible, 1.0 / np.where(visible, self.unit, 1.0), 0.0)[:, None]
+        return self.columns * np.where(visible, 1.0 / np.where(visible, self.unit, 1.0), 0.0)[:, None]
 
 
 @dataclass(frozen=True, eq=False)

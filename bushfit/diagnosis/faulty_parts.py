@@ -91,11 +91,11 @@ class FaultyPart(Explanation):
         if form == "gain":
             group = replace(group, columns=group.columns[:1], unit=group.unit[:1])
         elif form == "points":
-            size = np.abs(self.columns).max(axis=0)
+            size = np.abs(group.columns).max(axis=0)
             rows = np.flatnonzero(size)
             columns = np.zeros((rows.size, size.size))
             columns[np.arange(rows.size), rows] = size[rows]
-            group = Group(columns, np.eye(rows.size), act_together=True)
+            group = replace(group, columns=columns, unit=np.eye(len(columns)))
         return replace(self, group=group, form=form)
 
     def region(self, residual: Array, change: float) -> MisfitRegion:
@@ -360,7 +360,7 @@ def _common_fault(
         for axis in ("frequency", "amplitude")
     )
     ends = (float(frequency.min()), float(frequency.max())), (float(amplitude.min()), float(amplitude.max()))
-    group = Group(columns, unit, act_together=True, covered_rows=(_row_span(fit, sweeps), fit.residual.size))
+    group = Group(columns, unit, act_together=True, covered_rows=(fit.row_span(sweeps), fit.residual.size))
     return FaultyPart("part", family, name, group, sweeps[0].direction, *ends)
 
 
@@ -380,7 +380,7 @@ def _shift_columns(
         Changes of the residuals of all rows from the first to the last of `sweeps`, (2, rows), or (4, rows) with
         slopes.
     """
-    rows = _row_span(fit, sweeps)
+    rows = fit.row_span(sweeps)
     columns = np.zeros((2 + 2 * sloping, rows.stop - rows.start))
     for sweep, mask in zip(sweeps, chosen, strict=True):
         log_step = np.log(sweep.step)
@@ -391,9 +391,3 @@ def _shift_columns(
             column for shape in shapes for column in sweep.shared_error_columns(shape)
         ]
     return columns
-
-
-def _row_span(fit: FitResult, sweeps: Sequence[MeasuredSweep]) -> slice:
-    """Slice of the residual vector from the first to the last row of the given sweeps."""
-    slices = [fit.residual_rows[sweep] for sweep in sweeps]
-    return slice(min(rows.start for rows in slices), max(rows.stop for rows in slices))

@@ -6,7 +6,6 @@ from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -15,8 +14,8 @@ from bushfit.diagnosis.explanations import Group
 from bushfit.diagnosis.rig_errors import RigErrors
 from bushfit.effects.contract import Array
 
-#: Largest array of products, over noise cases or groups, that is computed at once: 4 million numbers, 32 MB.
-AT_ONCE = 4_000_000
+#: Largest number of values in the columns of one set of explanations: 8 MB.
+_IN_A_SET = 1_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,12 +23,14 @@ class RigRows:
     """Changes of the residuals by m causes, to compute inner products in which errors of the rig have less weight.
 
     Args:
-        rows: change X of the n residuals by each of m causes, such as explanations of a gap, (m, n).
+        rows: change X of consecutive residuals by each of m causes, such as explanations of a gap, (m, n).
         rig: errors of the rig.
+        first: index of the first of these residuals; the causes change no others.
     """
 
     rows: Array
     rig: RigErrors
+    first: int = 0
 
     @cached_property
     def shared(self) -> Array:
@@ -42,8 +43,11 @@ class RigRows:
         weights, kernels = self.rig.weights[0], self.rig.kernels[0]
         shared = np.zeros((len(weights), len(kernels), kernels.shape[-1], len(self.rows)))
         for number, block in enumerate(self.rig.blocks):
-            weighted = block.columns * weights[:, None, block.rows]
-            shared[:, number, : len(block.kinds)] = weighted @ self.rows[:, block.rows].T
+            changed = (self.first <= block.rows) & (block.rows < self.first + self.rows.shape[1])
+            if changed.any():
+                rows = block.rows[changed]
+                weighted = block.columns[:, changed] * weights[:, None, rows]
+                shared[:, number, : len(block.kinds)] = weighted @ self.rows[:, rows - self.first].T
         return shared
 
     def inner(self, other: RigRows, combinations: Array) -> Array:
@@ -60,6 +64,9 @@ class RigRows:
             return other.inner(self, combinations).swapaxes(1, 2)
         weights, scatter = self.rig.weights
         size, products = len(self.rows), np.empty((len(combinations), len(self.rows), len(other.rows)))
+        begin = max(self.first, other.first)  # of the residuals that both sets change
+        end = max(min(sets.first + sets.rows.shape[1] for sets in (self, other)), begin)
+        mine, others = (sets.rows[:, begin - sets.first : end - sets.first] for sets in (self, other))
         for number in np.unique(scatter[combinations]):
             chosen = scatter[combinations] == number
             kernels = self.rig.kernels[0][:, combinations[chosen]]
@@ -69,7 +76,8 @@ class RigRows:
             shared = other.shared[number].reshape(blocks * width, len(other.rows))
             among_errors = errors.reshape(count * size, blocks * width) @ shared  # in one product, which is fast
             among_errors = among_errors.reshape(count, size, len(other.rows))
-            products[chosen] = np.subtract(self.rows * weights[number] @ other.rows.T, among_errors, out=among_errors)
+            of_scatter = mine * weights[number, begin:end] @ others.T
+            products[chosen] = np.subtract(of_scatter, among_errors, out=among_errors)
         return products
 
 
@@ -162,15 +170,34 @@ class GroupSet:
 
     @classmethod
     def split(cls, groups: Sequence[Group], rig: RigErrors) -> list[GroupSet]:
-        """Build sets of the groups, in the same order, each small enough for the memory."""
-        part = np.cumsum([len(group.columns) * group.row_count for group in groups]) // AT_ONCE
-        ends = [0, *(np.flatnonzero(np.diff(part)) + 1).tolist(), len(groups)]
-        return [cls(groups[start:stop], rig) for start, stop in pairwise(ends) if stop > start]
+        """Build sets of the groups, in the same order, each small enough for the memory.
+
+        The columns of a set have the residuals that any of its groups changes.
+        """
+        sets, start, stop, count = list[list[Group]](), 0, 0, 0
+        for group in groups:
+            start, stop = min(start, group.rows.start), max(stop, group.rows.stop)
+            count += len(group.columns)
+            if not sets or count * (stop - start) > _IN_A_SET:
+                sets.append([])
+                start, stop, count = group.rows.start, group.rows.stop, len(group.columns)
+            sets[-1].append(group)
+        return [cls(members, rig) for members in sets]
+
+    @property
+    def span(self) -> slice:
+        """Slice of the residuals from the first to the last that any of the groups changes."""
+        return slice(min(g.rows.start for g in self.groups), max(g.rows.stop for g in self.groups))
 
     @cached_property
     def rows(self) -> RigRows:
         """Columns of all groups, with their inner products."""
-        return RigRows(np.concatenate([group.scaled for group in self.groups]), self.rig)
+        span, first = self.span, 0
+        rows = np.zeros((sum(len(group.columns) for group in self.groups), span.stop - span.start))
+        for group in self.groups:
+            changed = slice(group.rows.start - span.start, group.rows.stop - span.start)
+            rows[first : (first := first + len(group.columns)), changed] = group.scaled
+        return RigRows(rows, self.rig, span.start)
 
     @cached_property
     def batches(self) -> list[Batch]:
@@ -200,7 +227,8 @@ class GroupSet:
         by_batch = []
         for batch in self.batches:
             rows = self.rows.rows[batch.columns]
-            by_batch.append(np.array([rows * weight @ rows.swapaxes(-1, -2) for weight in self.rig.weights[0]]))
+            weights = self.rig.weights[0][:, self.span]
+            by_batch.append(np.array([rows * weight @ rows.swapaxes(-1, -2) for weight in weights]))
         return by_batch
 
     def within(self, combinations: Array) -> list[Array]:

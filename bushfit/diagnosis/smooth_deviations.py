@@ -190,12 +190,14 @@ def unnamed_curves(fit: FitResult) -> list[Explanation]:
         directions[direction].append(points)
     for roughness, lengths in _CURVE_LENGTHS.items() if sweeps else ():
         columns, changes = _smooth_changes(fit, sweeps, lengths, **_CURVE_PATTERNS)
+        covered = fit.row_span(sweeps), fit.residual.size
         for direction, masks in directions.items():
             of_direction = np.concatenate([changes * points for points in masks])
-            of_rows = _residual_changes(fit, sweeps, of_direction)
-            groups[f"{roughness} {direction}"] = Group(of_rows, of_direction, act_together=True)
+            of_rows = _residual_changes(fit, sweeps, of_direction)[:, covered[0]].copy()
+            groups[f"{roughness} {direction}"] = Group(of_rows, of_direction, act_together=True, covered_rows=covered)
         if roughness == "rough" and len(directions) > 1:  # a smooth curve in all directions is the compound's
-            groups["rough all"] = Group(columns, changes, act_together=True)
+            columns = columns[:, covered[0]].copy()
+            groups["rough all"] = Group(columns, changes, act_together=True, covered_rows=covered)
     if loops:
         repeats = group_repeats(loops)
         shapes = block_diag(*[basis(np.arange(_PHASES) / _PHASES, SMOOTH_HARMONICS).T] * len(repeats))

@@ -107,7 +107,7 @@ def covariance(
                 change = test.residual_change(test.compliance_error * stiffness**2, model)
                 by_compliance += influence[:, rows] @ change
         if smooth_error:  # beside it the error of the noise is the least part
-            changes = influence[:, : smooth_error.columns.shape[1]] @ smooth_error.columns.T
+            changes = smooth_error.project(influence) @ smooth_error.columns.T
             added = changes @ changes.T
             spread.append(added * np.sqrt(2.0 / smooth_error.freedom))
             matrix = matrix + added + sum(test.extra_covariance(influence[:, rows]) for test, rows in blocks)

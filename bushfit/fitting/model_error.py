@@ -40,7 +40,6 @@ from bushfit.fitting.discrepancy import (
     FittedTests,
     averaged,
     discrepancies,
-    process_columns,
 )
 from bushfit.fitting.levels import LevelErrors, level_error_columns, level_errors
 from bushfit.fitting.noise import SweepNoise
@@ -147,10 +146,12 @@ def with_model_error(
         return plain_fit, None
     weighed = [test.with_model_error(size) for test in plain_fit.covariance_tests or with_levels]
     fitted, likeliest_size = closest.reevaluate(closest.model, weighed), likeliest.best[1]
-    columns = process_columns(fitted, likeliest.groups, likeliest.lengths, likeliest_size)
-    process = SmoothError(columns, likeliest.likelihood.freedom(likeliest_size))
+    all_tests = FittedTests(fitted)
+    process = Discrepancy.over_tests(all_tests, likeliest.groups, likeliest.lengths, MAXIMUM_NODES)
+    freedom = likeliest.likelihood.freedom(likeliest_size)
+    smooth_error = SmoothError(likeliest_size * process.columns, all_tests.project, freedom)
     closest = replace(closest, noise_weighted=plain_fit.data_sets, outliers=plain_fit.outliers)
-    return replace(closest, covariance_tests=weighed, smooth_error=process), error
+    return replace(closest, covariance_tests=weighed, smooth_error=smooth_error), error
 
 
 def closest_fit(plain_fit: FitResult, bounds: Bounds) -> tuple[FitResult, float]:

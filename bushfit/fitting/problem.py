@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -135,12 +135,14 @@ class SmoothError:
     """Smooth error of a model over operating points (a Gaussian process), which adds to the errors of parameters.
 
     Args:
-        columns: change of the n whitened residuals of all tests for each of q independent patterns of the error, at one
-            standard deviation, (q, n).
+        columns: change of d components of the whitened residuals of all tests for each of q independent patterns of the
+            error, at one standard deviation, (q, d).
+        project: function that reduces the n residuals, (..., n), to these components, (..., d).
         freedom: degrees of freedom of the estimated standard deviation of the error.
     """
 
     columns: Array
+    project: Callable[[Array], Array]
     freedom: float
 
 
@@ -194,6 +196,11 @@ class FitResult:
     def residual_rows(self) -> Mapping[MeasuredTest, slice]:
         """Slice of the residuals of each test in `residual`."""
         return dict(zip(self.data_sets, residual_slices(self.data_sets), strict=True))
+
+    def row_span(self, tests: Sequence[MeasuredTest]) -> slice:
+        """Slice of `residual` from the first to the last residual of some of the tests."""
+        slices = [self.residual_rows[test] for test in tests]
+        return slice(min(rows.start for rows in slices), max(rows.stop for rows in slices))
 
     @property
     def fixed(self) -> list[str]:
