@@ -23,11 +23,12 @@ from bushfit.errors import FitError
 from bushfit.fitting.agreement import LeaveOut
 from bushfit.fitting.coordinates import Bounds
 from bushfit.fitting.descent import Descent
-from bushfit.fitting.discrepancy import process_columns
+from bushfit.fitting.discrepancy import Discrepancy, FittedTests
 from bushfit.fitting.model_error import with_model_error
 from bushfit.fitting.preparation import MeasuredTest, split_by_kind, with_gain_weighting
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.problem import FitProblem, FitResult
+from bushfit.gaussian_process import MAXIMUM_NODES
 from bushfit.model.covariance import Z95, Covariance
 from bushfit.units import number
 
@@ -143,7 +144,8 @@ def _hold_out_inside(before: FitResult, closest: FitResult, correction: Unnamed)
             if mask.any():
                 chosen.setdefault(name, {})[sweep] = mask
     groups = tuple(patch.directions for patch in correction.patches)
-    columns = process_columns(closest, groups, correction.lengths, correction.size)
+    process = Discrepancy.over_tests(FittedTests(closest), groups, correction.lengths, MAXIMUM_NODES)
+    columns = process.tests.residual_changes(correction.size * process.complex_shapes)
     amounts = np.eye(len(columns), closest.residual.size + len(columns), closest.residual.size)  # rows of their prior
     amounts[:, : columns.shape[1]] = columns
     slopes = np.pad(closest.jacobian[closest.inner_indices], ((0, 0), (0, len(columns))))

@@ -93,10 +93,8 @@ class Hypothesis:
         """Posterior predictive p-value: probability of a larger chi-square than measured if the hypothesis is true."""
         linear, group = self.state.linear, self.last.group if self.last else None
         if group and self.last_change:
-            rows, precision = (
-                replace(group, columns=group.scaled).whole,
-                np.full(len(group.columns), self.last_change**-2),
-            )
+            rows = replace(group, columns=group.scaled).whole
+            precision = np.full(len(rows), self.last_change**-2)
             linear = replace(
                 linear,
                 jacobian=np.concatenate((linear.jacobian, rows)),

@@ -206,11 +206,11 @@ class LinearModel:
         wide = ~self.rig.is_plain & (self.rig.deviation == 0.0)
         return float(np.logaddexp.reduce(self.over_cases[0][wide[self.cases]]))
 
-    def likely_cases(self, curves: GroupSet | None, far: float) -> Array:
+    def likely_cases(self, curves: Sequence[GroupSet], far: float) -> Array:
         """Select the noise cases (assumed sizes of the errors of rig and rubber) with a high evidence.
 
         Args:
-            curves: smooth curves, one of which may explain a gap; None without any.
+            curves: smooth curves, one of which may explain a gap.
             far: difference in log evidence from the best case beyond which a case is left out.
 
         Returns:
@@ -225,7 +225,7 @@ class LinearModel:
         near |= plain & (best[index] > best.max() - far)
         if curves:
             projection = self.project(self.cases[plain])
-            gains = [largest_gain(gram, b).max(axis=1) for _, b, gram in projection.products(curves)]
+            gains = [largest_gain(gram, b).max(axis=1) for curve in curves for _, b, gram in projection.products(curve)]
             with_curve = projection.base + np.max([np.zeros(len(projection.base)), *gains], axis=0)
             near[plain] |= with_curve > with_curve.max() - far
         return self.cases[near]

@@ -256,7 +256,7 @@ def nearest_power_law(
     bare, model = in_scatter_units(fitted), fitted.model
     begun = model.with_values({name: value for name, value in start.items() if name in model.values})
     rows, errors = bare.jacobian, rig_errors(bare, rig)
-    curves = GroupSet([curve.group for curve in unnamed_curves(bare) if curve.group], errors)
+    curves = GroupSet.split([curve.group for curve in unnamed_curves(bare) if curve.group], errors)
     cases = LinearModel(bare.residual, rows, np.zeros(len(rows)), errors).likely_cases(curves, _NEAR)
     motions = {test.direction.motion for test in fitted.data_sets} - {STRAINING}
     measures = [measure for measure in _MEASURES if motions and (measure != "stiffness" or len(motions) == 1)]
@@ -265,7 +265,7 @@ def nearest_power_law(
     grids = sorted(filter(None, settled), key=lambda grid: -grid.log_evidence)
     if not grids or grids[0].log_evidence < logsumexp(grids[0].linear.project(cases).base):
         return None
-    of_curves = grids[0].linear.group_evidence([curves], cases)  # around the same parameters and term
+    of_curves = grids[0].linear.group_evidence(curves, cases)  # around the same parameters and term
     log_ratios = np.array([grid.log_evidence - grids[0].log_evidence for grid in grids])
     likely = log_ratios > -0.5 * DECISIVE_CHI_SQUARE
     measure, *alternatives = [grid.measure for grid, is_likely in zip(grids, likely, strict=True) if is_likely]

@@ -6,6 +6,8 @@ from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import groupby
+from operator import attrgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -13,9 +15,6 @@ import numpy as np
 from bushfit.diagnosis.explanations import Group
 from bushfit.diagnosis.rig_errors import RigErrors
 from bushfit.effects.contract import Array
-
-#: Largest number of values in the columns of one set of explanations: 8 MB.
-_IN_A_SET = 1_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,10 +43,9 @@ class RigRows:
         shared = np.zeros((len(weights), len(kernels), kernels.shape[-1], len(self.rows)))
         for number, block in enumerate(self.rig.blocks):
             changed = (self.first <= block.rows) & (block.rows < self.first + self.rows.shape[1])
-            if changed.any():
-                rows = block.rows[changed]
-                weighted = block.columns[:, changed] * weights[:, None, rows]
-                shared[:, number, : len(block.kinds)] = weighted @ self.rows[:, rows - self.first].T
+            rows = block.rows[changed]
+            weighted = block.columns[:, changed] * weights[:, None, rows]
+            shared[:, number, : len(block.kinds)] = weighted @ self.rows[:, rows - self.first].T
         return shared
 
     def inner(self, other: RigRows, combinations: Array) -> Array:
@@ -159,7 +157,7 @@ class GroupSet:
     """Explanations to compare, with the inner products of their residual columns, which no fitted model changes.
 
     Args:
-        groups: candidate explanations, each a group of residual columns; g columns in all.
+        groups: candidate explanations that change the same residuals, each a group of columns; g columns in all.
         rig: errors of the rig.
     """
 
@@ -170,34 +168,13 @@ class GroupSet:
 
     @classmethod
     def split(cls, groups: Sequence[Group], rig: RigErrors) -> list[GroupSet]:
-        """Build sets of the groups, in the same order, each small enough for the memory.
-
-        The columns of a set have the residuals that any of its groups changes.
-        """
-        sets, start, stop, count = list[list[Group]](), 0, 0, 0
-        for group in groups:
-            start, stop = min(start, group.rows.start), max(stop, group.rows.stop)
-            count += len(group.columns)
-            if not sets or count * (stop - start) > _IN_A_SET:
-                sets.append([])
-                start, stop, count = group.rows.start, group.rows.stop, len(group.columns)
-            sets[-1].append(group)
-        return [cls(members, rig) for members in sets]
-
-    @property
-    def span(self) -> slice:
-        """Slice of the residuals from the first to the last that any of the groups changes."""
-        return slice(min(g.rows.start for g in self.groups), max(g.rows.stop for g in self.groups))
+        """Build sets of the groups, in the same order; those in a row that change the same residuals are one set."""
+        return [cls(list(members), rig) for _, members in groupby(groups, attrgetter("rows"))]
 
     @cached_property
     def rows(self) -> RigRows:
         """Columns of all groups, with their inner products."""
-        span, first = self.span, 0
-        rows = np.zeros((sum(len(group.columns) for group in self.groups), span.stop - span.start))
-        for group in self.groups:
-            changed = slice(group.rows.start - span.start, group.rows.stop - span.start)
-            rows[first : (first := first + len(group.columns)), changed] = group.scaled
-        return RigRows(rows, self.rig, span.start)
+        return RigRows(np.concatenate([group.scaled for group in self.groups]), self.rig, self.groups[0].rows.start)
 
     @cached_property
     def batches(self) -> list[Batch]:
@@ -227,7 +204,7 @@ class GroupSet:
         by_batch = []
         for batch in self.batches:
             rows = self.rows.rows[batch.columns]
-            weights = self.rig.weights[0][:, self.span]
+            weights = self.rig.weights[0][:, self.groups[0].rows]
             by_batch.append(np.array([rows * weight @ rows.swapaxes(-1, -2) for weight in weights]))
         return by_batch
 

@@ -111,14 +111,14 @@ class ExplanationColumns:
 
     @cached_property
     def sets(self) -> list[GroupSet]:
-        """Residual columns of all explanations, in sets small enough for the memory."""
+        """Residual columns of all explanations, in sets that change the same residuals."""
         return GroupSet.split([e.group for e in self.tests.explanations if e.group], self.errors)
 
     @cached_property
-    def curves(self) -> GroupSet | None:
-        """Columns of the smooth curves; None without curves."""
+    def curves(self) -> list[GroupSet]:
+        """Columns of the smooth curves."""
         curves = [e.group for e in self.tests.explanations if e.group and e.kind == "unnamed" and e.family != POWER_LAW]
-        return GroupSet(curves, self.errors) if curves else None
+        return GroupSet.split(curves, self.errors)
 
     def with_variance(self, variance: Array) -> ExplanationColumns:
         """Add independent errors of the residuals, of the given variances, (n,)."""

@@ -196,8 +196,7 @@ def unnamed_curves(fit: FitResult) -> list[Explanation]:
             of_rows = _residual_changes(fit, sweeps, of_direction)[:, covered[0]].copy()
             groups[f"{roughness} {direction}"] = Group(of_rows, of_direction, act_together=True, covered_rows=covered)
         if roughness == "rough" and len(directions) > 1:  # a smooth curve in all directions is the compound's
-            columns = columns[:, covered[0]].copy()
-            groups["rough all"] = Group(columns, changes, act_together=True, covered_rows=covered)
+            groups["rough all"] = Group(columns[:, covered[0]].copy(), changes, act_together=True, covered_rows=covered)
     if loops:
         repeats = group_repeats(loops)
         shapes = block_diag(*[basis(np.arange(_PHASES) / _PHASES, SMOOTH_HARMONICS).T] * len(repeats))

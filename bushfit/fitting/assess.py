@@ -104,11 +104,10 @@ def covariance(
         for test, rows in blocks:
             if test.compliance_error and test.direction.motion is TRANSLATION:
                 stiffness = model.stiffness(test.direction, test.frequency, test.amplitude, kind=test.kind)
-                change = test.residual_change(test.compliance_error * stiffness**2, model)
-                by_compliance += influence[:, rows] @ change
+                by_compliance += influence[:, rows] @ test.residual_change(test.compliance_error * stiffness**2, model)
         if smooth_error:  # beside it the error of the noise is the least part
-            changes = smooth_error.project(influence) @ smooth_error.columns.T
-            added = changes @ changes.T
+            by_error = smooth_error.project(influence) @ smooth_error.columns.T
+            added = by_error @ by_error.T
             spread.append(added * np.sqrt(2.0 / smooth_error.freedom))
             matrix = matrix + added + sum(test.extra_covariance(influence[:, rows]) for test, rows in blocks)
             continue

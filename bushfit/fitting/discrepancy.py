@@ -288,19 +288,3 @@ def discrepancies(tests: FittedTests) -> list[Discrepancy]:
     shared = dict.fromkeys([(names,), tuple((name,) for name in names)])
     pairs = product(shared, product(OVER_FREQUENCY, OVER_STRAIN))
     return [Discrepancy.over_tests(tests, groups, lengths, MAXIMUM_NODES) for groups, lengths in pairs]
-
-
-def process_columns(solution: FitResult, groups: Groups, lengths: tuple[float, float], size: float) -> Array:
-    """Changes of a fit's residuals due to the Gaussian process of a model's error.
-
-    Args:
-        solution: fit of the model.
-        groups: groups of directions or specimens; the members of a group share one error.
-        lengths: correlation lengths in ln frequency and ln strain.
-        size: standard deviation of the process, relative to |K|.
-
-    Returns:
-        Change of the n whitened residuals for each of q independent patterns, at one standard deviation, (q, n).
-    """
-    process = Discrepancy.over_tests(FittedTests(solution), groups, lengths, MAXIMUM_NODES)
-    return process.tests.residual_changes(size * process.complex_shapes)

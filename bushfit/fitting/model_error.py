@@ -146,10 +146,9 @@ def with_model_error(
         return plain_fit, None
     weighed = [test.with_model_error(size) for test in plain_fit.covariance_tests or with_levels]
     fitted, likeliest_size = closest.reevaluate(closest.model, weighed), likeliest.best[1]
-    all_tests = FittedTests(fitted)
-    process = Discrepancy.over_tests(all_tests, likeliest.groups, likeliest.lengths, MAXIMUM_NODES)
+    process = Discrepancy.over_tests(FittedTests(fitted), likeliest.groups, likeliest.lengths, MAXIMUM_NODES)
     freedom = likeliest.likelihood.freedom(likeliest_size)
-    smooth_error = SmoothError(likeliest_size * process.columns, all_tests.project, freedom)
+    smooth_error = SmoothError(likeliest_size * process.columns, process.tests.project, freedom)
     closest = replace(closest, noise_weighted=plain_fit.data_sets, outliers=plain_fit.outliers)
     return replace(closest, covariance_tests=weighed, smooth_error=smooth_error), error
 
@@ -266,7 +265,7 @@ def log_likelihood(solution: FitResult, prior_precision: Mapping[str, float]) ->
         across = shares @ tests.project(tests.free_jacobian).T
         information = information - across.T @ np.linalg.solve(shares @ shares.T + np.eye(len(shares)), across)
     information = information + np.diag([prior_precision.get(solution.names[i], 0.0) for i in solution.inner_indices])
-    log_size = sum(loop.shared_errors.log_det_covariance for loop in split_by_kind(tests.data_sets)[0])
+    log_size = sum(np.log1p(np.square(x.shared_errors.deviations)).sum() for x in split_by_kind(tests.data_sets)[0])
     log_size += float(np.linalg.slogdet(information)[1])
     for prior in solution.model.constraints.priors:
         names = [name for name in prior.names if name in solution.names]

@@ -96,7 +96,8 @@ def fit_joint(
     if not preload_ranges(tests):
         effects = [name for name in effects if name != PRELOAD]
     unused = [test for test in data.data_sets if test not in tests]
-    problem = data.problem(data.starting_model(effects, tests), tests)
+    # copies, so that what they compute for the fit is released with it
+    problem = data.problem(data.starting_model(effects, tests), [replace(test) for test in tests])
     found = estimate(problem, robust=data.robust)
 
     def refit(errors: LevelErrors) -> FitResult:

@@ -65,11 +65,6 @@ class SharedErrors:
         directions[rows, of_residual] = entries
         return cls(directions, deviation)
 
-    @property
-    def log_det_covariance(self) -> float:
-        """Natural log of the determinant of the residuals' covariance with the shared errors."""
-        return float(np.sum(np.log1p(np.square(self.deviations))))
-
     def whiten(self, rows: Array) -> Array:
         """Multiply residuals or derivatives in units of noise, (..., n), by S^(-1/2), to remove correlation."""
         if not self.deviations.any():

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from contextlib import suppress
 from functools import lru_cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,9 +11,6 @@ from bushfit.errors import ModelError
 from bushfit.fitting.descent import EVALUATIONS, TOLERANCE, Descent
 from bushfit.fitting.problem import FitProblem, FitResult
 from bushfit.model.model import Model
-
-if TYPE_CHECKING:
-    import lmfit
 
 
 def solve_with_lmfit(problem: FitProblem) -> FitResult:
@@ -49,17 +45,13 @@ def solve_with_lmfit(problem: FitProblem) -> FitResult:
             raise ModelError("a step of the fit leaves the bounds")
         return problem.model.with_values(problem.coordinates.values(point))
 
-    def model_of(parameters: lmfit.Parameters) -> Model:
-        """Model with the values of lmfit's parameters."""
-        return model_at(*(parameter.value for parameter in parameters.values()))
-
     # a residual that is not finite is a ValueError of lmfit, which takes roots of a covariance nobody asked for
     with suppress(ModelError, ValueError), np.errstate(invalid="ignore", divide="ignore"):
         fit = lmfit.minimize(
-            lambda parameters: problem.residual(model_of(parameters)),
+            lambda parameters: problem.residual(model_at(*parameters.valuesdict().values())),
             free,
             "leastsq",
-            Dfun=lambda parameters: problem.linearise(model_of(parameters))[1],
+            Dfun=lambda parameters: problem.linearise(model_at(*parameters.valuesdict().values()))[1],
             col_deriv=True,
             gtol=0.0,
             ftol=TOLERANCE,
@@ -68,7 +60,7 @@ def solve_with_lmfit(problem: FitProblem) -> FitResult:
             calc_covar=False,
         )
         if not fit.aborted:
-            best = model_of(fit.params)
+            best = model_at(*fit.params.valuesdict().values())
             at_bound = problem.at_bound(problem.coordinates.point(best.values))
             return FitResult(problem, best, *problem.linearise(best), int(fit.nfev), at_bound)
     return Descent.start(problem, TOLERANCE).run().solution
