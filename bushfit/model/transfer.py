@@ -103,7 +103,7 @@ def transfer_compound(result: Result, bushing: Bushing) -> tuple[Result, Caveat]
         alternatives=tuple(replace(record, model=transfer(record.model)) for record in result.alternatives),
     )
     sentence = f"{bushing.name}: predicted from the compound of {result.name}; no bushing of this shape was tested"
-    if omitted := [effect_label(name) for name in result.model.effects if name not in model.effects]:
+    if omitted := [effect_label(one.name) for one in result.model.records if one.name not in model.effects]:
         sentence += f"; left out, because they belong to {result.name} or its rig: {', '.join(omitted)}"
     if spread := factor_spread(result):
         elsewhere = with_factor(elsewhere, [*Direction], spread)
