@@ -130,6 +130,8 @@ def list_folder(folder: Path) -> tuple[list[TestSource], list[Caveat]]:
             why = "its name contains characters that are not text; rename it"
         elif path.is_dir() and not os.access(path, os.R_OK | os.X_OK):
             why = "no permission to read this folder"
+        elif path.is_dir() and (path / "model.json").is_file():
+            why = "results of bushfit"
         elif path.is_dir() and not path.is_symlink():
             inner_files, inner_left_out = list_folder(path)
             if number := labels_in_names(path.name).specimen_number:

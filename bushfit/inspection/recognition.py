@@ -100,8 +100,10 @@ def recognize_table(file: Path, test_options: Mapping[str, Any]) -> tuple[Table,
     units = {"displacement": "m", "force": "N", "stiffness": "N/m", "storage_stiffness": "N/m", "phase": "rad"}
     advice = hint_for_convertible_columns(best)
     column = columns_key(best, lacking, units.get(lacking, "1"))
-    if set(best.roles) == {"time", "displacement"} and '"..."' in column:
-        advice = "a displacement alone is a history for bushfit respond; a test needs a column for the force, too"
+    if set(best.roles) in ({"time", "displacement"}, {"time", "force"}) and '"..."' in column:
+        advice = f"a test needs a column for the {lacking}, too: if another file has it, join the two"
+        if lacking == "force":
+            advice = f"a displacement alone is a history for bushfit respond; {advice}"
     raise best.header_error(
         "the columns are not those of a test",
         kind=NoTestError,

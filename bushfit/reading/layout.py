@@ -142,9 +142,8 @@ def find_layout(
     if not lines:
         return Layout(delimiter or ",", (), 1, (), None)
     end, delimiters = _first_rows(lines, tuple(DELIMITERS.values()) if delimiter is None else (delimiter,))
-    before = [index for index in range(end) if header_line in (None, lines[index].number)]
-    if header_line is not None and not before:
-        before = [index for index, line in enumerate(lines) if line.number == header_line]
+    stated = [index for index, line in enumerate(lines) if line.number == header_line]
+    before = range(end) if header_line is None else stated
     candidates = list(_candidates(lines, before, delimiters, vocabulary))
     if header_line is None and not any(is_test(vocabulary.roles(cells)) for *_, cells in candidates):
         below = _candidates(lines, range(end, len(lines)), delimiters, vocabulary)

@@ -152,10 +152,8 @@ def unpivot(source: RowSource, layout: Layout, file: Path, vocabulary: Vocabular
         )
     sheet, long_layout = _long_table(columns, source, file, vocabulary)
     summaries = dict.fromkeys(text for text in texts if is_summary_row([text]))
-    notes = tuple(
-        Caveat("summary_column", f'the column "{text}" is left out, because it summarizes other columns')
-        for text in summaries
-    )
+    sentence = 'the column "{}" is left out, because it summarizes other columns'
+    notes = tuple(Caveat("summary_column", sentence.format(text)) for text in summaries)
     written = tuple(text for text in texts if any(m.role or m.stepped for m in _read_corner(text, vocabulary)))
     return sheet, replace(long_layout, delimiter=mark, written=written, notes=notes)
 
@@ -198,11 +196,9 @@ def _read_block(headers: Sequence[list[str]], rows: Sequence[Line], vocabulary: 
     meanings = {n: meanings[n] | across | _Meaning(stepped=stepped) for n in columns}
     if stepped is None or len(columns) < 2 or not all(meaning.level for meaning in meanings.values()):
         return []
-    names: dict[_Meaning, set[tuple[str, ...]]] = {}
     all_texts = list(map(_merged, headers))
-    for column, meaning in meanings.items():
-        names.setdefault(meaning, set()).add(tuple(texts[column] for texts in all_texts))
-    if any(len(texts) > 1 for texts in names.values()):
+    named = {(meaning, *(texts[column] for texts in all_texts)) for column, meaning in meanings.items()}
+    if len(named) > len(set(meanings.values())):
         return []  # such as K axial and K radial, or two samples, at the same level
     down = replace(down, stepped=_STEPPED[stepped == _STEPPED[0]])
     return [

@@ -22,8 +22,8 @@ _HARMONICS, _FREQUENCY_HARMONICS = 15, 3
 #: Largest condition number of the scaled normal equations with which rows separate harmonics; chosen: errors grow
 #: tenfold.
 _WORST_CONDITION = 100.0
-#: Number of columns up to which rows may be too few to separate them, and the relative singular value in that case.
-_FEW_COLUMNS, _SINGULAR = 5, 1e-12
+#: Singular value of the normal equations, relative to the largest one, below which rows do not separate columns.
+_SINGULAR = 1e-12
 #: Terms of the drift of a step: mean, slope and curvature.
 _DRIFT_TERMS = 3
 #: Rows of a step in one chunk of the fit, so that their harmonics stay in a core's cache; rows that are enough to
@@ -72,10 +72,8 @@ def least_squares(columns: Floats, values: Floats, weight: NDArray[Any] | None =
         Real coefficients of the columns, (k,) or (k, channels).
     """
     weighed = columns.T if weight is None or np.all(weight == 1.0) else columns.T * weight
-    gram, moments = weighed @ columns, weighed @ values
-    if len(gram) <= _FEW_COLUMNS:  # four rows per cycle do not tell two harmonics apart
-        return np.asarray(np.linalg.lstsq(gram, moments, rcond=_SINGULAR)[0])
-    return np.linalg.solve(gram, moments)
+    # four rows per cycle do not tell two harmonics apart
+    return np.asarray(np.linalg.lstsq(weighed @ columns, weighed @ values, rcond=_SINGULAR)[0])
 
 
 def as_complex(real: Floats) -> Complex:
@@ -115,7 +113,7 @@ def cycle_harmonics(phase: Floats, values: Floats, order: int, drift: int = 0) -
         Mean, complex fundamental, and standard deviation of the residuals of each channel, (k,) each.
     """
     columns = basis(phase, order, *(phase**power for power in range(1, drift + 1)))
-    solution = np.linalg.lstsq(columns, values, rcond=None)[0]
+    solution = least_squares(columns, values)
     fundamental = solution[1 + drift] + 1j * solution[1 + drift + order]
     return solution[0], fundamental, np.std(values - columns @ solution, axis=0)
 
