@@ -27,7 +27,7 @@ def change(folder: Path, file: str, column: str, rows: str, expression: str) -> 
     """Change a column of a CSV in the rows of a pandas query to a NumPy expression of its values x and the table t."""
     t = pd.read_csv(folder / file)
     index = t.query(rows).index
-    t.loc[index, column] = eval(expression, {**vars(np), "x": t.loc[index, column], "t": t.loc[index]})
+    t.loc[index, column] = eval(expression, {**vars(np), "x": t.loc[index, column], "t": t})
     t.to_csv(folder / file, index=False)
 
 

@@ -212,25 +212,6 @@ def test_a_second_channel_of_a_long_record_is_asked_about(tmp_path):
     assert "more than one column could be the displacement" in done.stderr
 
 
-@pytest.mark.parametrize("title", ["", "Amplitude: 1 mm\n"])
-@pytest.mark.parametrize(
-    ("first", "second", "words"),
-    [
-        ("t,x,F\ns,mm,N", "t,x,F\ns,um,kN", ["the displacement has two units", "um, kN on line", "mm, N on line"]),
-        ("t,x,F\n[s],[mm],[N]", "t,x,F\n[s],[mm],[kN]", ["the force has two units", "[kN] on line", "N on line"]),
-        ("t,x,F\ns,mm,N", "s,um,kN", ["um, kN on line", "mm, N on line"]),
-        ("t [s],x [mm],F [N]", "t [s],x [um],F [N]", ["x [um] on line", "mm on line"]),
-        ("t [s],x [mm],F [N]", "t [s],F [N],x [mm]", ["another order", "t [s], F [N], x [mm]", "t [s], x [mm], F [N]"]),
-    ],
-)
-def test_blocks_with_other_units_or_another_order_are_refused(first, second, words, title, tmp_path):
-    rows = "\n".join(f"{t:.6g},{x:.6g},{f:.6g}" for t, x, f in zip(TIME, DISPLACEMENT, FORCE, strict=True))
-    (tmp_path / "blocks.csv").write_text(f"{title}{first}\n{rows}\n{title}{second}\n{rows}\n")
-    done = typing(tmp_path)("inspect", "blocks.csv", "--direction", "axial", "--json", status=2)
-    assert [word for word in words if word not in done.stderr] == []
-    assert [path.name for path in tmp_path.iterdir()] == ["blocks.csv"]
-
-
 @pytest.mark.parametrize(
     "variables",
     [
