@@ -21,7 +21,7 @@ from bushfit.report.plots.style import to_image
 
 #: Values shown of a long column, entries of a long list, and lines of a long text, evenly spaced.
 VALUES, ENTRIES, LINES = 4, 6, 200
-NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
+NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
 #: Keys, columns and texts that differ from run to run or from release to release.
 CHANGING = re.compile(r"seconds|key|inputs|version|sha256|provenance")
 CHANGING_TEXT = re.compile(r'bushfit \d+\.\d+\.\d+.*| time="[\d.]+"|; [\d.]+ s, [\d.]+ per second|\b[0-9a-f]{12,}\b')
@@ -151,9 +151,10 @@ def agree(expected: str, obtained: str) -> bool:
     texts = NUMBER.findall(expected)
     old, new = (np.clip(np.array(numbers, float), -1e99, 1e99) for numbers in (texts, NUMBER.findall(obtained)))
     if expected.startswith("|"):
-        parts = [text.partition("e") for text in texts]
+        parts = [text.lower().partition("e") for text in texts]
         digits = np.array([len(number.partition(".")[2]) - int(exponent or 0) for number, _, exponent in parts], float)
-        return bool(np.all(np.isclose(new, old, PRINTED, 1.01 * 10.0 ** np.clip(-digits, -99, 99))))
+        last = np.maximum(1.01 * 10.0 ** np.clip(-digits, -99, 99), 1e-12)  # less is rounding of zero
+        return bool(np.all(np.isclose(new, old, PRINTED, last)))
     tolerance = DERIVED if DERIVATIVES.search(expected) else DATA
     return bool(np.all(np.isclose(new, old, 0.0, tolerance * np.abs(old).max(initial=0.0) + 1e-12)))
 
