@@ -57,6 +57,11 @@ SUPERSCRIPTS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
 FULL_WIDTH = {code: code - 0xFEE0 for code in range(0xFF01, 0xFF5F)}
 #: First character of a sign in UTF-8 that was decoded as Windows-1252: "Âµm", "Â°", "Ns/mmÂ²".
 _MOJIBAKE = re.compile("Â(?=[µ°·²³])")
+#: Remark behind a unit of energy: J/cycle, mJ per cycle, N mm/Zyklus.
+_PER_CYCLE = re.compile(
+    r"(?<=[Jm³3])\s*(?:/|\b(?:per|je|pro|par|por)\b)\s*(?:cyc(?:le)?|zyklus|schwingung|lastwechsel|lw|ciclo|cykl|サイクル|循环|周期)$",
+    re.IGNORECASE,
+)
 #: Maximum length of a unit [characters]; pint is slow with longer texts.
 _LONGEST_UNIT = 40
 #: Unit by spelling: in lower case, with capitals, and spellings of an acceleration and of a length.
@@ -308,7 +313,7 @@ def common_unit(unit: str) -> tuple[str, str]:
 @lru_cache(maxsize=256)
 def _resolve(text: str) -> tuple[float, str]:
     """Factor to SI, and SI base unit, of a unit; the base unit of an angle is the radian."""
-    text = _MOJIBAKE.sub("", text.translate(FULL_WIDTH)).replace("Î¼", "µ").strip().rstrip(".")
+    text = _PER_CYCLE.sub("", _MOJIBAKE.sub("", text.translate(FULL_WIDTH)).replace("Î¼", "µ").strip().rstrip("."))
     text = re.sub("(?<=10)[⁻⁰¹²³⁴-⁹]+", lambda power: "^" + power[0].translate(SUPERSCRIPTS), text)
     if match := _MULTIPLE.fullmatch(text):
         scale, base = _resolve(match["unit"])

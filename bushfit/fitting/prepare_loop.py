@@ -34,6 +34,9 @@ from bushfit.units import number
 #: Largest difference of the amplitude of the mean cycle from half the range of the record, relative to that half;
 #: chosen: noise and drift of a steady loop are smaller. Rows that are enough to find the range.
 _UNEQUAL, _ENOUGH_ROWS = 0.15, 100_000
+#: Smallest covariance of displacement and force in a cycle, relative to the largest of the other sign, that is no noise
+#: or incomplete cycle; chosen: a force of opposite sign has nearly -1.
+_REVERSED = 0.5
 #: Root mean square difference of the displacement from its mean cycle, without noise and relative to the amplitude:
 #: from which on cycles are unequal, and from which on they are no loop, whose mean has then lost 4 % of its amplitude;
 #: chosen: rigs keep a motion within 1 %, and a drift adds some per cent.
@@ -109,6 +112,7 @@ def prepare_loop(loop: Loop, *, without_outliers: bool = False) -> MeasuredLoop:
     unequal = _unequal_cycles(prepared, found.motion_scatter)
     prepared = _with_row_noise(prepared, found)
     prepared = replace(prepared, weights=np.where(_at_reversal(prepared), 0.0, prepared.weights))
+    _check_one_sign(loop, frequency)
     _check_loses_energy(prepared)
     if from_rest and not rests[0]:
         prepared = replace(prepared, datum=float(np.average(prepared.measured_force, weights=prepared.weights)))
@@ -157,6 +161,22 @@ def _unequal_cycles(prepared: MeasuredLoop, scatter: float) -> list[Caveat]:
             hint="is this a swept sine, or two sines at a time? A loop needs cycles of one amplitude, rate and mean",
         )
     return [Caveat("unequal_cycles", f"the cycles are not equal: their mean has an amplitude of {sizes}")]
+
+
+def _check_one_sign(loop: Loop, frequency: float) -> None:
+    """Raise a FitError if the force rises with the displacement in some cycles and falls in others."""
+    turn = ((loop.time - loop.time[0]) * frequency).astype(np.intp)
+    covariance = np.bincount(turn, (loop.displacement - loop.displacement.mean()) * (loop.force - loop.force.mean()))
+    smaller, larger = sorted((float(covariance.min()), float(covariance.max())), key=abs)
+    if smaller * larger < 0.0 and abs(smaller) > _REVERSED * abs(larger):
+        row = int(np.argmax(np.sign(covariance)[turn] != np.sign(covariance[0])))
+        raise FitError(
+            "the force changes its sign within the record",
+            file=loop.source.file if loop.source else None,
+            found=f"displacement and force in phase before or after {loop.time[row]:.4g} s, and in antiphase otherwise",
+            expected="one sign, as one load cell has",
+            hint="write each part to a file of its own; force_sign = -1 in the campaign turns the force of a file",
+        )
 
 
 def _check_loses_energy(prepared: MeasuredLoop) -> None:

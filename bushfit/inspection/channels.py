@@ -85,7 +85,7 @@ def odd_recording(
     force = RecordedChannel(names[1], *units.force, record.force)
     odd = [
         *wrong_labels(labels, place, amplitudes, frequencies, sampling_rate),
-        *implausible_sizes(place, np.array(frequencies), np.array(amplitudes), np.array(stiffness)),
+        *implausible_sizes(place, np.array(frequencies), np.array(amplitudes), np.array(stiffness), record.preload),
         *gaps(motion, record),
         *stuck_rows(motion, force),
     ]

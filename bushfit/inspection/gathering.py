@@ -2,7 +2,7 @@
 
 import os
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from itertools import permutations
@@ -53,6 +53,7 @@ class TestSource:
         is_named: True if the user named the file itself, False if it was found in a folder.
         test_options: keys of [[loops]] and [[sweeps]] that the user states for the test.
         of_book: labels (quantities stated in text) in the sheets of the workbook that contain no test.
+        differs_in_force: True if the force in its name is the preload, because names of other tests state other forces.
     """
 
     file: Path
@@ -60,6 +61,7 @@ class TestSource:
     is_named: bool = True
     test_options: Mapping[str, Any] = field(default_factory=dict)
     of_book: Labels = NO_LABELS
+    differs_in_force: bool = False
 
     def __str__(self) -> str:
         """File, and name of its sheet, for sentences."""
@@ -71,7 +73,7 @@ class TestSource:
 
     def inspect(self) -> Inspection:
         """Inspect the test: its kind (loop, sweep or raw history), its contents, and anything unusual in it."""
-        return inspect_file(self.file, self.test_options, self.of_book)
+        return inspect_file(self.file, self.test_options, self.of_book, differs_in_force=self.differs_in_force)
 
 
 def gather(paths: Sequence[Path], test_options: Mapping[str, Any]) -> tuple[list[TestSource], list[Caveat]]:
@@ -90,36 +92,32 @@ def gather(paths: Sequence[Path], test_options: Mapping[str, Any]) -> tuple[list
     """
     sources, left_out = list[TestSource](), list[Caveat]()
     for path in paths:
-        files, sentences = list_folder(path) if path.is_dir() else ([TestSource(path)], [])
-        left_out += sentences
-        count = len(sources)
-        for file in files:
-            tests, sentences = split_sheets(file, test_options)
-            sources += tests
-            left_out += sentences
-        if len(sources) == count:
-            raise NoTestError(
-                "no file of this folder contains a test",
-                file=path,
-                found="; ".join(map(str, left_out)) or "nothing",
-                expected="loops or sweeps, as " + ", ".join(TEST_FILES[:4]) + " or .xlsx",
-                hint="bushfit inspect FILE shows how bushfit reads a file",
-            )
-    tests = []
-    for source in distribute_options(sources, test_options):
-        split, sentences = split_rows(source)
-        tests += split
-        left_out += sentences
+        files = [*list_folder(path, left_out)] if path.is_dir() else [TestSource(path)]
+        of_path = [test for file in files for test in split_sheets(file, test_options, left_out)]
+        sources += of_path
+        if not of_path:
+            problem = "no file of this folder contains a test"
+            found = "; ".join(map(str, left_out)) or "nothing"
+            expected = "loops or sweeps, as " + ", ".join(TEST_FILES[:4]) + " or .xlsx"
+            hint = "bushfit inspect FILE shows how bushfit reads a file"
+            raise NoTestError(problem, file=path, found=found, expected=expected, hint=hint)
+    tests = [test for source in distribute_options(sources, test_options) for test in split_rows(source, left_out)]
+    forces = [labels_in_names(test.sheet or "", test.file.stem).force for test in tests]
+    if len({*forces} - {None}) > 1:
+        tests = [replace(test, differs_in_force=True) for test in tests]
     return tests, left_out
 
 
-def list_folder(folder: Path) -> tuple[list[TestSource], list[Caveat]]:
+def list_folder(folder: Path, left_out: list[Caveat]) -> Iterator[TestSource]:
     """List the files of a folder and its subfolders by name; a subfolder such as "P01" names the specimen of its files.
 
-    Returns:
-        Files that may contain tests, and a warning on each of the other files.
+    Args:
+        folder: folder to search; subfolders with results of bushfit, which contain a model.json, are left out.
+        left_out: list to which a warning on each other file is added.
+
+    Yields:
+        Files that may contain tests.
     """
-    files, left_out = list[TestSource](), list[Caveat]()
     for path in sorted(folder.iterdir()):
         why = ""
         if path.name.startswith((".", "~$")):
@@ -128,74 +126,79 @@ def list_folder(folder: Path) -> tuple[list[TestSource], list[Caveat]]:
             why = "a broken link"
         elif printable(path.name) != path.name:
             why = "its name contains characters that are not text; rename it"
+        elif (path / "model.json").exists():
+            why = "results of bushfit"
         elif path.is_dir() and not os.access(path, os.R_OK | os.X_OK):
             why = "no permission to read this folder"
         elif path.is_dir() and (path / "model.json").is_file():
             why = "results of bushfit"
         elif path.is_dir() and not path.is_symlink():
-            inner_files, inner_left_out = list_folder(path)
-            if number := labels_in_names(path.name).specimen_number:
-                inner_files = [replace(file, test_options={"specimen_number": number}) for file in inner_files]
-            files += inner_files
-            left_out += inner_left_out
+            number = labels_in_names(path.name).specimen_number
+            keys = {"specimen_number": number} if number else {}
+            for file in list_folder(path, left_out):
+                yield replace(file, test_options={**file.test_options, **keys})
         elif path.is_file() and path.suffix.lower() in TEST_FILES:
-            files.append(TestSource(path, is_named=False))
+            yield TestSource(path, is_named=False)
         else:
             why = "a link to a folder" if path.is_dir() else "not a table (by its extension)"
         left_out += [Caveat("left_out", why).about(printable(str(path)))] if why else []
-    return files, left_out
 
 
-def split_sheets(file: TestSource, test_options: Mapping[str, Any]) -> tuple[list[TestSource], list[Caveat]]:
+def split_sheets(file: TestSource, test_options: Mapping[str, Any], left_out: list[Caveat]) -> list[TestSource]:
     """Select the sheets of a workbook that may contain a test, or the file itself if it has one sheet.
 
     Args:
         file: test file; a file with one sheet that the user named is accepted without a check of its columns.
         test_options: options that apply to all tests; with the key `sheet`, the file is one test.
+        left_out: list to which a warning on each sheet or file without a test is added.
 
     Returns:
-        The tests, and a warning on each sheet or file without one.
+        The tests.
     """
     sheets, whole = [], distribute_options([file], test_options)
     with suppress(BushfitError):  # which the inspection of the file reports
         sheets = [] if test_options.get("sheet") else list(open_file(file.file, FileFormat()).parts)
     parts = [replace(file, sheet=sheet.sheet) for sheet in sheets] if len(sheets) > 1 else [file]
     if len(parts) == 1 and file.is_named:
-        return whole, []
-    tests, left_out, without = list[TestSource](), list[Caveat](), set[str | None]()
+        return whole
+    tests, failed = list[TestSource](), dict[str | None, Caveat]()
     for part in distribute_options(parts, test_options):
         try:
             recognize_table(part.file, part.test_options)
         except NoTestError as error:
-            without.add(part.sheet)
             why = f"{error.problem} ({error.found})" if error.found else f"{error.problem}; {error.hint}"
             kind = "to_reduce" if isinstance(error, ResonanceTestError) else "left_out"
-            left_out.append(Caveat(kind, why).about(part))
+            failed[part.sheet] = Caveat(kind, why).about(part)
             continue
         except BushfitError:  # which the inspection of the test reports
             pass
         tests.append(part)
+    if not tests and file.is_named:  # the error of the whole file says why
+        return whole
+    left_out += failed.values()
     means = [test for test in tests if test.sheet and is_summary_row([test.sheet])]
     if len(means) < len(tests):
         tests = [test for test in tests if test not in means]
         left_out += [Caveat("left_out", "a summary of the other sheets, by its name").about(test) for test in means]
-    if not tests and file.is_named:  # the error of the whole file says why
-        return whole, []
-    if without and len(parts) > 1:
-        of_book = labels_above(line for sheet in sheets if sheet.sheet in without for line in sheet.head)
+    if failed and len(parts) > 1:
+        of_book = labels_above(line for sheet in sheets if sheet.sheet in failed for line in sheet.head)
         tests = [replace(test, of_book=of_book) for test in tests]
-    return tests, left_out
+    return tests
 
 
-def split_rows(source: TestSource) -> tuple[list[TestSource], list[Caveat]]:
+def split_rows(source: TestSource, left_out: list[Caveat]) -> list[TestSource]:
     """Split a file with columns for direction, part number, run, temperature or preload into one test for each level.
 
     The runs of a sweep are repeats and are not split. The runs of a loop are split only if time restarts in each run.
 
+    Args:
+        source: file or sheet.
+        left_out: list to which a warning on the rows of each combination without a test is added.
+
     Returns:
-        The tests, and a warning on the rows of each combination that is left out.
+        The tests.
     """
-    test_options, tests, left_out = source.test_options, list[TestSource](), list[Caveat]()
+    test_options, tests = source.test_options, list[TestSource]()
     try:
         table, is_sweep = recognize_table(source.file, source.without("direction", "specimen_number").test_options)
         columns = dict(table.row_labels)
@@ -211,7 +214,7 @@ def split_rows(source: TestSource) -> tuple[list[TestSource], list[Caveat]]:
                 rows_of = {(): np.arange(sum(1 for _ in table.rows()))}
             levels = {row: split_conditions(table, rows, test_options) for row, rows in rows_of.items()}
     except BushfitError:  # which the inspection of the file reports
-        return [source], []
+        return [source]
     for texts, tests_at_levels in levels.items():
         if "run" in columns and not is_sweep and (count := labels.count(texts)) < FEWEST_LOOP_ROWS:
             why = f"{count} rows of run {', '.join(texts)} are too few for a loop"
@@ -228,7 +231,7 @@ def split_rows(source: TestSource) -> tuple[list[TestSource], list[Caveat]]:
         else:
             why = "other values were stated" if is_direction else "the direction is unknown"
             left_out.append(Caveat("left_out", f"rows of {', '.join(texts)} are not used: {why}").about(source))
-    return (tests, left_out) if tests else ([source], [])
+    return tests or [source]
 
 
 def distribute_options(sources: Sequence[TestSource], test_options: Mapping[str, Any]) -> list[TestSource]:

@@ -16,7 +16,6 @@ from bushfit.reading.levels import read_condition
 from bushfit.reading.names import Labels, StatedQuantity, labels_in_names
 from bushfit.reading.roles import UNIT_NAMES
 from bushfit.reading.si_columns import columns_key
-from bushfit.reading.stiffness import hint_for_convertible_columns
 from bushfit.reading.table import Table
 from bushfit.reading.times import sampling_rate_above
 from bushfit.units import is_compatible, is_unit, parse_quantity, si_factor
@@ -53,12 +52,8 @@ def labels_of_file(file: Path, sheet: str, test_options: Mapping[str, Any]) -> L
     convention = test_options.get("amplitude")
     if convention is None:
         return labels
-    frequencies = labels.of_dimension("Hz")
-    quantities = tuple(
-        quantity if quantity in frequencies else quantity._replace(convention=convention)
-        for quantity in labels.quantities
-    )
-    return replace(labels, quantities=quantities)
+    quantities = [one if "Hz" in one.unit else one._replace(convention=convention) for one in labels.quantities]
+    return replace(labels, quantities=tuple(quantities))
 
 
 def keys_from_labels(
@@ -111,7 +106,8 @@ def keys_from_labels(
     for key, name in _CONDITIONS.items():
         texts = ((origin, text) for origin, labels in sources.items() if (text := getattr(labels, key)))
         origin, text = next(texts, ("", ""))
-        if text and key not in test_options and (key != "temperature" or key not in table.roles):
+        is_static = key != "preload" or origin == written or "force_amplitude" not in table.roles
+        if text and key not in test_options and is_static and (key != "temperature" or key not in table.roles):
             keys[key] = text
             facts.setdefault(origin, []).append(f"{name} {text}")
     return keys, {origin: ", ".join(sentences) for origin, sentences in facts.items()}, has_convention
@@ -152,13 +148,12 @@ def _constant_quantity(
     state = f'state {key} = "{example}" in the campaign'
     if "block" in table.headers:
         state = f'write a [[sweeps]] table for each block with rows = {{ block = "1" }} and {key} = "{example}"'
-    other_way = hint_for_convertible_columns(table, {"period" if role == "frequency" else "extremes"})
     counting = ', with amplitude = "peak-to-peak" if it counts so' if role == "amplitude" else ""
     raise table.header_error(
         f"the {role} of this test is not stated",
         found=f"{origin}: {' and '.join(listed)}" if found else None,
         expected=f"a column for the {role}, or one number with its unit in the name of the file",
-        hint=other_way or f"{state}, or name the column: {columns_key(table, role, expected)}{counting}",
+        hint=f"{state}, or name the column: {columns_key(table, role, expected)}{counting}",
     )
 
 

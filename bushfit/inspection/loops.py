@@ -61,8 +61,7 @@ def describe_loop(loop: Loop, labels: Mapping[str, Labels]) -> Findings:
     mean_force = float(least_squares(basis(prepared.phase, 2), prepared.measured_force, prepared.weights)[0])
     mean_motion = prepared.coefficients[0].real
     noise = f"{number(100 * prepared.noise / half_force, 2)} % of half the {names[1]} range, per row"
-    if prepared.noise > half_force:
-        noise = "not known: the record is not a steady loop"
+    noise += correlation_text(prepared)
     facts = {
         "cycles": f"{prepared.cycles:.3g}, {'the first from rest' if prepared.from_rest else 'treated as steady'}",
         "frequency": f"{frequency:.4g} Hz, {waveform(prepared.coefficients)}",
@@ -71,7 +70,7 @@ def describe_loop(loop: Loop, labels: Mapping[str, Labels]) -> Findings:
         # down to the last digit of the amplitude: what lies below is noise
         f"mean {names[0]}": f"{format_aligned([to_length * amplitude, to_length * mean_motion], 4)[1]} {length}",
         f"mean {names[1]}": f"{format_aligned([to_force * half_force, to_force * mean_force], 4)[1]} {force}",
-        "noise": noise + correlation_text(prepared) * (prepared.noise <= half_force),
+        "noise": noise if prepared.noise <= half_force else "not known: the record is not a steady loop",
     }
     if means := recorded_means(prepared):
         # without a mean force, a mean displacement may be a preload after which the force was set to zero
@@ -202,6 +201,8 @@ def changing_cycles(prepared: MeasuredLoop) -> Iterator[Caveat]:
     order = resolved_order(rows, 7)  # a loop of rubber has next to nothing beyond
     if count < 2 or rows < 4 * order:
         return
+    if max(np.diff(phase[part], append=phase[part[0]] + 1.0).max() for part in parts) * order > 1.0:
+        return  # a series says nothing about a part without rows, such as that of a force that is cut off
     both = np.stack((loop.force, loop.displacement), axis=1)
     fitted = [cycle_harmonics(phase[part], both[part], order) for part in parts]
     # the first cycle from rest has another mean, by the memory of the rubber

@@ -10,7 +10,7 @@ import numpy as np
 
 from bushfit.campaign.campaign import reader_keywords
 from bushfit.caveat import Caveat
-from bushfit.errors import BushfitError, MeasurementError, error_location
+from bushfit.errors import error_location
 from bushfit.geometry import Direction, Place, Specimen
 from bushfit.inspection.labels import contradicting_lines, count_temperatures, keys_from_labels, labels_of_file
 from bushfit.inspection.loops import describe_history, describe_loop, describe_programme
@@ -39,7 +39,9 @@ _QUASI_STATIC = 1.0
 _FAR_FROM_MEAN = 0.5
 
 
-def inspect_file(file: Path, test_options: Mapping[str, Any], of_book: Labels = NO_LABELS) -> Inspection:
+def inspect_file(
+    file: Path, test_options: Mapping[str, Any], of_book: Labels = NO_LABELS, *, differs_in_force: bool = False
+) -> Inspection:
     """Recognize a test file, read the test, and describe its contents and oddities.
 
     Args:
@@ -47,6 +49,7 @@ def inspect_file(file: Path, test_options: Mapping[str, Any], of_book: Labels = 
         test_options: keys of [[loops]] and [[sweeps]], as TOML gives them, and sizes of a specimen in shear; keys that
             do not apply are ignored.
         of_book: labels in the other sheets of its workbook.
+        differs_in_force: True if the force in the name is the preload.
 
     Returns:
         The inspection, with the test in SI.
@@ -60,6 +63,7 @@ def inspect_file(file: Path, test_options: Mapping[str, Any], of_book: Labels = 
     read_as = place or Direction.AXIAL  # which of two translations it is makes no difference to reading
     entry = campaign_entry(table, place, test_options, is_sweep=is_sweep)
     by_name = labels_of_file(file, table.source.sheet or "", test_options)
+    by_name |= Labels(preload=by_name.force if differs_in_force else None)
     label_keys, label_facts, counted = keys_from_labels(table, read_as, entry, by_name, of_book, is_sweep=is_sweep)
     labels = {"name": by_name, "text above the table": table.labels_above}
     if "at_amplitude" in label_keys:
@@ -75,10 +79,9 @@ def inspect_file(file: Path, test_options: Mapping[str, Any], of_book: Labels = 
             if "peak-to-peak" in (amplitude.convention, entry.get("amplitude")):
                 facts["amplitudes"] += f', half of "{amplitude.header}", which is peak-to-peak'
     else:
-        measured, entry, turned = read_either_sign(table, read_as, entry)
-        settings = reader_arguments(table, read_as, entry, LoopFile)["test"]
-        kind, (facts, odd) = classify_recording(measured, labels, settings)
-        odd = turned + odd
+        arguments = reader_arguments(table, read_as, entry, LoopFile)
+        measured = read_loop(**arguments)
+        kind, (facts, odd) = classify_recording(measured, labels, arguments["test"])
         if preload := facts.get("preload"):
             if "preload" in label_keys and is_contradicted(entry["preload"], measured):
                 stated = entry.pop("preload")
@@ -164,34 +167,6 @@ def reader_arguments(
         return {**next(reader_keywords(Path(), [test], [file.stem], specimens)), "file": table.opened}
 
 
-def read_either_sign(table: Table, place: Place, entry: dict[str, Any]) -> tuple[Loop, dict[str, Any], list[Caveat]]:
-    """Read a loop, and reverse the sign of its force if the force falls while the displacement rises.
-
-    Args:
-        table: table of the file.
-        place: direction or specimen.
-        entry: keys of the test's table in a campaign.
-
-    Returns:
-        The loop, its keys in a campaign, and a list with a warning on the reversed force, if any.
-    """
-    try:
-        return read_loop(**reader_arguments(table, place, entry, LoopFile)), entry, []
-    except MeasurementError as error:
-        turned = {**entry, "force_sign": -1}
-        try:
-            if "force_sign" in entry:
-                raise
-            loop = read_loop(**reader_arguments(table, place, turned, LoopFile))
-        except BushfitError:
-            raise error from None
-    sentence = (
-        f'"{table.roles["force"].header}" falls where "{table.roles["displacement"].header}" rises: the force '
-        "has the opposite sign; state force_sign = -1 in the campaign"
-    )
-    return loop, turned, [Caveat("reversed_force", sentence)]
-
-
 def is_contradicted(text: str, loop: Loop) -> bool:
     """True if a preload stated in text, such as "5 N", is far from the mean of the loop, whatever its sign."""
     if (preload := parse_preload(text, loop.direction)) is None:
@@ -246,7 +221,7 @@ def describe_columns(table: Table, *, is_sweep: bool) -> tuple[ColumnDescription
         is_read = role in values and column.subtracted is None
         ends = (float(values[role].min()), float(values[role].max())) if is_read else (None, None)
         for index in column.indices:
-            columns[index] = ColumnDescription(table.headers[index], role.replace("_", " "), column.unit, *ends)
+            columns[index] = ColumnDescription(table.headers[index], column.role.replace("_", " "), column.unit, *ends)
     return tuple(columns)
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from bushfit.caveat import Caveat
 from bushfit.effects.contract import Array
 from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Place
+from bushfit.reading.preload import Preload
 from bushfit.units import display_unit, number
 
 #: Smallest and largest frequency of a test [Hz]; chosen: from one cycle a month to ultrasound.
@@ -19,7 +20,9 @@ _FORCES = {TRANSLATION: (0.0, 2e5), ROTATION: (0.0, 1e5), STRAINING: (0.0, 1e9)}
 _STIFFNESSES = {TRANSLATION: (1e4, 1e11), ROTATION: (1e-3, 1e9), STRAINING: (1e4, 1e10)}
 
 
-def implausible_sizes(place: Place, frequency: Array, amplitude: Array, stiffness: Array) -> Iterator[Caveat]:
+def implausible_sizes(
+    place: Place, frequency: Array, amplitude: Array, stiffness: Array, preload: Preload | None = None
+) -> Iterator[Caveat]:
     """Warn of frequencies, amplitudes and stiffness that no test of a rubber part has.
 
     Args:
@@ -27,16 +30,20 @@ def implausible_sizes(place: Place, frequency: Array, amplitude: Array, stiffnes
         frequency: frequencies [Hz], (n,).
         amplitude: zero-to-peak amplitudes [m, rad or strain], (n,).
         stiffness: magnitudes of the stiffness [N/m, N m/rad or Pa], (n,).
+        preload: stated preload; None without one.
 
     Returns:
         One warning for each quantity beyond its limits.
     """
     motion = place.motion
+    static = np.array([abs(preload.value)] if preload else [])
+    is_force = preload is not None and preload.unit == motion.force_unit
     quantities = (
         ("frequency", "Hz", frequency, FREQUENCIES),
         ("strain" if motion is STRAINING else "amplitude", motion.displacement_unit, amplitude, _AMPLITUDES[motion]),
         (motion.words[2], motion.stiffness_unit, stiffness, _STIFFNESSES[motion]),
         (f"{motion.words[1]} amplitude", motion.force_unit, amplitude * stiffness, _FORCES[motion]),
+        ("preload", preload.unit if preload else "N", static, (_FORCES if is_force else _AMPLITUDES)[motion]),
     )
     has_warned = False
     for name, unit, values, (lowest, highest) in quantities:

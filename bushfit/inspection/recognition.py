@@ -20,7 +20,7 @@ from bushfit.reading.parts import OpenedFile, open_file
 from bushfit.reading.resonance import is_resonance
 from bushfit.reading.roles import PAIRS, of_motion, si_unit
 from bushfit.reading.si_columns import columns_key
-from bushfit.reading.stiffness import hint_for_convertible_columns, refuse_ambiguous_damping
+from bushfit.reading.stiffness import refuse_ambiguous_damping
 from bushfit.reading.table import Table
 from bushfit.units import is_compatible
 from bushfit.validation import validate_tables
@@ -30,7 +30,7 @@ BLOCK_KEYS = ("area", "thickness", "elements")
 #: Campaign keys for the column of the loss, which a symbol such as D or psi does not distinguish.
 _LOSS_COLUMN = (
     'columns = { loss_factor = "..." } or columns = { damping_ratio = "..." }, half of the loss factor, or '
-    'columns = { damping_coefficient = "..." }'
+    'columns = { specific_damping = "..." }, 2 pi times the loss factor, or columns = { damping_coefficient = "..." }'
 )
 #: Headers of a bar in tension: E', |E*|, "storage modulus E'", "tensile strain".
 _TENSILE = re.compile(r"(?<![^\W_])E(?![^\W_])|young|tensile|tension|traction|zug", re.IGNORECASE)
@@ -71,16 +71,14 @@ def recognize_table(file: Path, test_options: Mapping[str, Any]) -> tuple[Table,
             refuse_ambiguous_damping(table)
     if complete:  # a sweep before a loop, and columns of a stiffness or modulus before the amplitude of a force
         direct = [pair for pair in PAIRS if pair[0] != "force_amplitude"]
-        ranks = [
-            (
-                not is_sweep,
-                not any({*pair} <= {*table.roles} for pair in direct),
-                count_other_units(table),
-                -len(table.roles),
-            )
-            for table, is_sweep in complete
-        ]
-        return complete[ranks.index(min(ranks))]
+
+        def rank(candidate: tuple[Table, bool]) -> tuple[bool, bool, int, int]:
+            """Order of preference of a table that is a loop or a sweep."""
+            table, is_sweep = candidate
+            is_direct = any({*pair} <= {*table.roles} for pair in direct)
+            return not is_sweep, not is_direct, count_other_units(table), -len(table.roles)
+
+        return min(complete, key=rank)
     resonance: Table | None = None
     with suppress(BushfitError):  # whose columns are not those of a resonance test
         resonance = open_table(content, RESONANCE_COLUMNS, test_options)
@@ -97,9 +95,8 @@ def recognize_table(file: Path, test_options: Mapping[str, Any]) -> tuple[Table,
             raise failure
     understood = ", ".join(role.replace("_", " ") for role in best.roles)
     lacking = missing_role(best, is_sweep=is_sweep) or "force"
-    units = {"displacement": "m", "force": "N", "stiffness": "N/m", "storage_stiffness": "N/m", "phase": "rad"}
-    advice = hint_for_convertible_columns(best)
-    column = columns_key(best, lacking, units.get(lacking, "1"))
+    column = columns_key(best, lacking, si_unit(lacking, best.motion))
+    advice = f"correct the header, or name the column: {_LOSS_COLUMN if lacking == 'loss_factor' else column}"
     if set(best.roles) in ({"time", "displacement"}, {"time", "force"}) and '"..."' in column:
         advice = f"a test needs a column for the {lacking}, too: if another file has it, join the two"
         if lacking == "force":
@@ -109,8 +106,7 @@ def recognize_table(file: Path, test_options: Mapping[str, Any]) -> tuple[Table,
         kind=NoTestError,
         found=", ".join(best.headers) + f" (understood: {understood})" if understood else None,
         expected="time, displacement and force; or frequency, amplitude, and stiffness with loss factor or phase",
-        hint=advice
-        or f"correct the header, or name the column: {_LOSS_COLUMN if lacking == 'loss_factor' else column}",
+        hint=advice,
     )
 
 
@@ -188,19 +184,16 @@ def test_direction(file: Path, table: Table, test_options: Mapping[str, Any]) ->
     option, in_text = test_options.get("direction"), named_direction(line.text for line in table.lines_above)
     is_doubtful = of_channels is Direction.AXIAL and (option or in_text not in (None, of_channels))
     found = stated or (None if is_doubtful else of_channels)
-    if option is None:
-        if len(in_column) > 1:
-            problem, hint = "this file contains tests in several directions", "state one: --direction axial"
-            raise table.header_error(problem, found=", ".join(in_column), expected="one direction", hint=hint)
-        return found
-    if found and found != option and len(in_column) < 2:
-        raise table.header_error(
-            f"{'the units say' if is_torsion else 'the file says'} {found}, but --direction says {option}",
-            found=", ".join([*filter(None, [file.name, table.source.sheet]), *headers]),
-            expected="one direction",
-            hint="leave --direction out, or correct what the file states",
-        )
-    return Direction(option)
+    texts, problem = list(in_column), ""
+    if option is None and len(in_column) > 1:
+        problem, hint = "this file contains tests in several directions", "state one: --direction axial"
+    elif option and found and found != option and len(in_column) < 2:
+        problem = f"{'the units say' if is_torsion else 'the file says'} {found}, but --direction says {option}"
+        texts = [file.name, table.source.sheet or "", *headers]
+        hint = "leave --direction out, or correct what the file states"
+    if problem:
+        raise table.header_error(problem, found=", ".join(filter(None, texts)), expected="one direction", hint=hint)
+    return Direction(option) if option else found
 
 
 def open_content(file: Path, test_options: Mapping[str, Any]) -> OpenedFile:

@@ -4,7 +4,6 @@ import os
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from itertools import chain, count
 from pathlib import Path
 from typing import Any, Literal
 
@@ -144,13 +143,10 @@ class Inspection:
         """Assumptions about the file, each with the option or key that changes it; None if nothing was assumed."""
         assumptions = []
         if isinstance(self.direction, Specimen) and self.direction.kind == "modulus":
-            meaning, alternative = "the engineering shear strain", "tension"
-            if self.direction.strain == "tension":
-                meaning, alternative = "the strain of a bar in tension", "engineering"
-            assumptions.append(
-                f'the strain is read as {meaning}; otherwise state strain = "{alternative}" or "tensor" in '
-                "[[specimens]]"
-            )
+            is_tension = self.direction.strain == "tension"
+            meaning = "the strain of a bar in tension" if is_tension else "the engineering shear strain"
+            otherwise = f'strain = "{"engineering" if is_tension else "tension"}" or "tensor" in [[specimens]]'
+            assumptions.append(f"the strain is read as {meaning}; otherwise state {otherwise}")
         if self.amplitude_convention_unknown:
             place = "file" if "at_amplitude" in self.entry else "header"
             assumptions.append(
@@ -216,13 +212,11 @@ def campaigns_of_parts(
     for inspection in files:
         of_parts.setdefault(inspection.part or "", []).append(inspection)
     if unknown := of_parts.pop("", []):
-        raise CampaignError(
-            "the specimen number of this test is not stated",
-            file=unknown[0].file,
-            found=f"specimens {', '.join(of_parts)} in other files",
-            expected="a specimen number in every file, or files of a single part",
-            hint="--specimen-number selects the tests of one part; files that state no part are included",
-        )
+        problem = "the specimen number of this test is not stated"
+        found = f"specimens {', '.join(of_parts)} in other files"
+        expected = "a specimen number in every file, or files of a single part"
+        hint = "--specimen-number selects the tests of one part; files that state no part are included"
+        raise CampaignError(problem, file=unknown[0].file, found=found, expected=expected, hint=hint)
     texts = {listed_in: f"# a campaign of each part: bushfit batch {listed_in}\n"}
     for number, (part, tests) in enumerate(of_parts.items(), start=1):
         file = f"{folder_name(part)}.toml"
@@ -244,13 +238,10 @@ def with_specimens_named(files: Sequence[Inspection]) -> list[Inspection]:
     """
     named, renamed = dict[Specimen, Specimen](), list[Inspection]()
     for inspection in files:
-        specimen = inspection.direction
-        if isinstance(specimen, Specimen):
-            if specimen not in named:
-                used = {specimen_named.name for specimen_named in named.values()}
-                names = chain([specimen.name], (f"{specimen.name}_{number}" for number in count(2)))
-                named[specimen] = replace(specimen, name=next(name for name in names if name not in used))
-            body = named[specimen]
+        if isinstance(specimen := inspection.direction, Specimen):
+            number = sum(other.name == specimen.name for other in named) + 1
+            body = replace(specimen, name=f"{specimen.name}_{number}" if number > 1 else specimen.name)
+            body = named.setdefault(specimen, body)
             inspection = replace(inspection, direction=body, entry={**inspection.entry, "specimen": body.name})
         renamed.append(inspection)
     return renamed

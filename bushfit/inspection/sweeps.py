@@ -74,7 +74,7 @@ def describe_sweep(sweep: Sweep, labels: Mapping[str, Labels]) -> Findings:
     }
     odd = [
         *MeasuredSweep(test=sweep, noise=noise).notes,
-        *implausible_sizes(sweep.direction, sweep.frequency, sweep.amplitude, np.abs(sweep.stiffness)),
+        *implausible_sizes(sweep.direction, sweep.frequency, sweep.amplitude, np.abs(sweep.stiffness), sweep.preload),
         *wrong_labels(labels, sweep.direction, levels.tolist(), frequencies.tolist()),
         *copied_rows(sweep, noise, points),
         *odd_levels(sweep, points),

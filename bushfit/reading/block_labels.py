@@ -7,15 +7,24 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from bushfit import units
 from bushfit.caveat import Caveat
+from bushfit.geometry import Place, Specimen
 from bushfit.reading.headers import COUNTED, SWEEP_COLUMNS, Vocabulary
 from bushfit.reading.lines import Line, is_summary_row
-from bushfit.reading.names import is_remark, labels_and_text_above, labels_in_names, named_direction, named_quantities
+from bushfit.reading.names import (
+    is_remark,
+    labels_above,
+    labels_and_text_above,
+    labels_in_names,
+    named_direction,
+    named_quantities,
+    names_coupon,
+)
 from bushfit.reading.numerals import is_like_number, without_groups
 from bushfit.reading.roles import CONDITIONS
 from bushfit.reading.source import cells_of
@@ -78,6 +87,11 @@ def find_remarks(table: Table) -> tuple[Caveat, ...]:
     """
     remarks = ((line.number, line.text[:_LONGEST_QUOTE]) for line in table.lines_above if is_remark(line.text))
     warnings = [Caveat("remark", f'line {number} is not understood: "{text}"') for number, text in remarks]
+    for line in table.lines_above if table.first_decimal is None else ():
+        forms = [plain_numbers(line, mark) for mark in ".,"]
+        if labels_above(forms[:1]) != labels_above(forms[1:]):
+            meanings = " or ".join(f'"{form.text[:_LONGEST_QUOTE]}"' for form in forms)
+            warnings.append(Caveat("remark", f"line {line.number} can be read in two ways: {meanings}"))
     rows = [] if all(is_like_number(str(cell)) for cell in table.first_row) else table.first_rows
     texts = Counter(cell for row in rows for cell in row if isinstance(cell, str) and cell[:1].isalpha())
     warnings += [
@@ -94,6 +108,18 @@ def find_remarks(table: Table) -> tuple[Caveat, ...]:
         )
         warnings.append(Caveat("divided_cells", sentence))
     return tuple(warnings)
+
+
+def note_coupon(table: Table, place: Place) -> Iterator[Caveat]:
+    """Warn if the texts of a file name a coupon of rubber, but its test is read as one of a bushing."""
+    texts = [table.file.stem, table.source.sheet or "", *(line.text for line in table.lines_above), *table.headers]
+    if not isinstance(place, Specimen) and (named := [text for text in texts if names_coupon(text)]):
+        sentence = (
+            f'"{named[0][:_LONGEST_QUOTE]}" may name a coupon, but the test is read as one of a bushing. A block in '
+            'shear needs --area "..." --thickness "..." --elements N, or [[specimens]] in the campaign; for a strip or '
+            "bar, write strain and stress into the file"
+        )
+        yield Caveat("coupon", sentence)
 
 
 def label_columns(

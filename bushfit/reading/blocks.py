@@ -14,9 +14,9 @@ from bushfit.reading.block_labels import is_of_block, label_columns, plain_numbe
 from bushfit.reading.headers import WORDS, Vocabulary, plain, split_unit, without_mean
 from bushfit.reading.layout import Layout
 from bushfit.reading.lines import WITH_UNIT, Line, is_comment, is_row, is_summary_row, is_units_row, split
-from bushfit.reading.names import NO_LABELS, labels_above
+from bushfit.reading.names import NO_LABELS, labels_above, named_quantities
 from bushfit.reading.numerals import common_decimal, is_like_number, plainest_value
-from bushfit.reading.roles import PAIRS, is_test
+from bushfit.reading.roles import PAIRS, UNIT_NAMES, is_test, with_conversions
 from bushfit.reading.source import Channels, RowSource, Sheet, Text, cells_of
 
 #: Largest text that is searched for blocks without their own headers [bytes]; chosen: some 100,000 rows.
@@ -175,12 +175,13 @@ def _find_sides(layout: Layout, vocabulary: Vocabulary) -> list[Side]:
     for names in map(list, {tuple(by_index.values()): by_index.values() for by_index in columns.values()}.values()):
         sides = {name: by_index for name, by_index in columns.items() if list(by_index.values()) == names}
         used, roles = set().union(*sides.values()), vocabulary.roles(names)
+        known = with_conversions(roles)
         plain_names = {plain(split_unit(name)[0]) for name in names}
         free = [index for index in range(len(written)) if index not in used]
         shared = [index for index in free if without_mean(split_unit(written[index][0])[0]) not in plain_names]
         are_repeats = next(iter(sides)).isdigit() and len(shared) < len(free)  # numbers beside their mean
         shared_roles = vocabulary.roles([layout.headers[index] for index in shared])
-        available = roles | shared_roles if are_repeats else roles
+        available = known | shared_roles if are_repeats else known
         has_stiffness = any({*pair} <= available for pair in PAIRS if pair[0] != "force_amplitude")
         is_sweep = "frequency" in shared_roles and has_stiffness and len(roles) == len(names)
         are_equal = names == [layout.headers[index] for index in next(iter(sides.values()))]
@@ -200,7 +201,9 @@ def _side_by_side(source: RowSource, layout: Layout, sides: Sequence[Side]) -> l
     head = [line for line in source.head if line.number < layout.header_line]
     rows = [line for line in source.lines(layout.lines_before_data) if not is_comment(line.content, layout.delimiter)]
     width = len(layout.headers)
-    titles: list[list[Line]] = [[Line(layout.header_line, side.title)] * bool(side.title) for side in sides]
+    legend = {name: " ".join(quantity) for line in head for name, quantity in named_quantities(line).items()}
+    names = [legend.get(side.title, side.title) for side in sides]  # "A1 = 0.1 mm" above "K* A1 [N/mm]"
+    titles: list[list[Line]] = [[Line(layout.header_line, name)] * bool(name) for name in names]
     for line in head if not sides[0].title else ():
         cells = list(map(str, cells_of(line, layout.delimiter)))
         padded = [*cells, *[""] * width]
@@ -275,6 +278,7 @@ def _stacked_blocks(source: RowSource, layout: Layout, vocabulary: Vocabulary) -
 
 def _with_plain_cells(source: RowSource, layout: Layout) -> tuple[RowSource, Layout]:
     """Split the columns whose cells contain more than a number each, see `_plain_columns`."""
+    source, layout = _with_units_in_cells(source, layout)
     width = len(layout.headers)
 
     def columns(lines: Iterable[Line]) -> Iterator[PlainColumn]:
@@ -333,6 +337,29 @@ def _are_uncertain(cells: Sequence[str | float]) -> bool:
     """True if the first cells of a column have uncertainties behind, or plus-minus signs before, their numbers."""
     first = [str(cell) for cell in cells[:_FIRST] if cell != ""]
     return bool(first) and all(_UNCERTAIN.fullmatch(text) or text[0] == "±" for text in first)
+
+
+def _with_units_in_cells(source: RowSource, layout: Layout) -> tuple[RowSource, Layout]:
+    """Write the units in columns such as "Stiffness unit", or "unit" on the right of a quantity, behind its numbers."""
+    columns = dict[int, int]()
+    for index, header in enumerate(layout.headers):
+        words = re.split(r"[\s_]+", header)
+        names = [" ".join(word for word in words if plain(word) not in UNIT_NAMES)]
+        if names[0] != " ".join(words):
+            columns[index] = layout.headers.index(names[0]) if names[0] in layout.headers else index - 1
+    lines = [(line.number, [*cells_of(line, layout.delimiter)]) for line in source.lines(layout.lines_before_data)]
+    filled = [str(cells[index]) for _, cells in lines[:_FIRST] for index in columns if len(cells) > index]
+    if -1 in columns.values() or not filled or not all(units.is_unit(text) for text in filled):
+        return source, layout
+    for _, cells in lines:
+        for index in (index for index in sorted(columns, reverse=True) if len(cells) > index):
+            unit = str(cells.pop(index)).strip(" -")
+            cells[columns[index]] = f"{cells[columns[index]]} {unit}".strip()
+    kept = [index for index in range(len(layout.headers)) if index not in columns]
+    headers, row = (tuple(texts[index] for index in kept) for texts in (layout.headers, layout.units))
+    numbers, content = zip(*lines, strict=True)
+    above = [line for line in source.head if line.number < layout.header_line]
+    return Sheet(source.sheet or "", content, numbers=numbers, above=above), replace(layout, headers=headers, units=row)
 
 
 def _common_unit(texts: Sequence[str], stated: str) -> str:

@@ -27,6 +27,7 @@ from bushfit.reading.inference import (
     add_by_unit,
     add_half_differences,
     add_motion_as_amplitude,
+    convert_roles,
     moves_along,
     name_parallel_spring,
 )
@@ -92,7 +93,7 @@ def classify(
         else:
             roles[role] = _preferred_column(table, roles[role], column)
     notes = add_half_differences(table, roles, extremes)
-    for role in ("amplitude_reached", "acceleration"):
+    for role in ("amplitude_reached", "velocity", "acceleration"):
         if role in roles and "amplitude" not in roles:
             roles["amplitude"] = replace(roles.pop(role), role="amplitude")
     named = {*roles}
@@ -117,6 +118,7 @@ def classify(
         notes += name_parallel_spring(roles)
     stated = {*columns, *stated_units}
     _require_plain_names(table, {role: column for role, column in roles.items() if role not in stated})
+    notes += convert_roles(roles, certain=columns)
     time = roles.get("time")
     is_clock = time is not None and clock(str(table.first_row[time.index])) is not None
     notes = [*table.layout.notes, *notes]
@@ -202,12 +204,10 @@ def _stated_indices(table: Table, vocabulary: Vocabulary, columns: Mapping[str, 
         elif role not in named_roles:
             near = next(iter(get_close_matches(text, table.headers if table.is_table else (), 1, _ALIKE)), "")
             advice = f'did you mean "{near}"?' if near else "name one of this file:"
-            raise table.header_error(
-                f'there is no column "{text}"',
-                kind=NoColumnError,
-                expected=f"the header that was stated for the {role.replace('_', ' ')}, or its number",
-                hint=f'{advice} columns = {{ {role} = "{near or "..."}" }} in the campaign',
-            )
+            problem = f'there is no column "{text}"'
+            expected = f"the header that was stated for the {role.replace('_', ' ')}, or its number"
+            hint = f'{advice} columns = {{ {role} = "{near or "..."}" }} in the campaign'
+            raise table.header_error(problem, kind=NoColumnError, expected=expected, hint=hint)
     return indices
 
 

@@ -19,7 +19,8 @@ from bushfit.reading.table import Table
 from bushfit.reading.wide import unpivot
 
 _NUMBERED_COLUMNS = (
-    'columns = { time = "1", displacement = "2", force = "3" } or '
+    'columns = { time = "1", displacement = "2", force = "3" } (without time, but with sampling_rate = "100 Hz", if '
+    "column 1 counts the rows) or "
     'columns = { frequency = "1", amplitude = "2", stiffness = "3", loss_factor = "4" }'
 )
 _EXPECTED_HEADER = 'a header row such as "time [s],displacement [mm],force [N]"'

@@ -40,11 +40,7 @@ def _columns_of(test: str) -> dict[str, list[str]]:
 SWEEP_COLUMNS, STRAINING_COLUMNS = _columns_of("sweep"), _columns_of("straining")
 LOOP_COLUMNS = {**_columns_of("loop"), **{role: SWEEP_COLUMNS[role] for role in ("temperature", "preload")}}
 RESONANCE_COLUMNS = {"frequency": SWEEP_COLUMNS["frequency"], **_columns_of("resonance")}
-DISPLACEMENT_COLUMNS = {
-    "time": LOOP_COLUMNS["time"],
-    **_columns_of("displacements"),
-    "displacement": LOOP_COLUMNS["displacement"],
-}
+DISPLACEMENT_COLUMNS = _columns_of("displacements") | {role: LOOP_COLUMNS[role] for role in ("time", "displacement")}
 _OF_TESTS = (SWEEP_COLUMNS, STRAINING_COLUMNS, LOOP_COLUMNS, RESONANCE_COLUMNS, DISPLACEMENT_COLUMNS)
 #: Names of the columns of all kinds of tests, by role, with which the header of a table is found.
 ALL_COLUMNS = {
@@ -101,7 +97,7 @@ _UNITS_NOT_F = {("f", "force"): ("Hz",), ("famplitude", "force_amplitude"): ("Hz
 #: Units that a role cannot have: "Amplitude [N/m]" is the magnitude of a stiffness.
 _UNITS_NOT = {"amplitude": ("N/m", "N*m/rad")}
 #: Units with which a short or ambiguous name means a role, by name and role.
-_UNITS_OF = {
+UNITS_OF = {
     (name, role): si
     for role, entries in WORDS["units_of"].items()
     for name, *si in (entry.split() for entry in entries)
@@ -308,7 +304,7 @@ def fits(word: str, role: str, unit: str | None) -> bool:
         return False
     if word == "t" and role in ("time", "temperature") and unit is not None:
         return bool(units.kelvin_scale(unit)) == (role == "temperature")
-    if unit and (expected := _UNITS_OF.get((word, role))):
+    if unit and (expected := UNITS_OF.get((word, role))):
         return any(units.is_compatible(unit, si) for si in expected)
     excluded = (*_UNITS_NOT_F.get((word, role), ()), *_UNITS_NOT.get(role, ()))
     return not any(units.is_compatible(unit or "", si) for si in excluded)
@@ -375,6 +371,14 @@ def split_unit(header: str) -> tuple[str, str | None, AmplitudeConvention | None
         if unit and (certain or units.is_unit(unit)):
             return name, unit, convention
     return text, None, convention
+
+
+def units_in_header(header: str) -> Iterator[str]:
+    """Yield each text in a header that may be its unit: kN/mm, mm and N_mm of "Kdyn_N_mm [kN/mm]"."""
+    name, unit = units.split_header(header)
+    yield from (one for _, one, _ in _splits(name) if one)
+    if unit:
+        yield from (unit, *units_in_header(name))
 
 
 def _splits(text: str) -> Iterator[tuple[str, str | None, bool]]:

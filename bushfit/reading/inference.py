@@ -1,6 +1,6 @@
 """Roles of columns without a known name: by their unit, and as amplitudes that other columns determine."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +12,7 @@ from bushfit.reading.headers import (
     LOOP_COLUMNS,
     ROLE_SETS,
     SWEEP_COLUMNS,
+    UNITS_OF,
     WORDS,
     Column,
     Extreme,
@@ -24,7 +25,7 @@ from bushfit.reading.headers import (
     split_unit,
 )
 from bushfit.reading.numerals import is_like_number
-from bushfit.reading.roles import of_motion, si_unit
+from bushfit.reading.roles import CONVERSIONS, of_motion, si_unit
 from bushfit.reading.si_columns import column_of, first_numbers
 from bushfit.reading.table import Table
 from bushfit.reading.times import clock
@@ -76,14 +77,11 @@ def add_by_unit(table: Table, roles: dict[str, Column]) -> tuple[list[Caveat], l
     notes, amplitude = [], _QUALIFIERS["amplitude"]
     motions = (STRAINING,) if motion is STRAINING else (TRANSLATION, ROTATION)
     for role, qualifier in _BY_UNIT.items():
-        if (
-            role in roles
-            or role not in names
-            or (role in ("phase", "damping_coefficient") and ROLE_SETS["losses"] & set(roles))
-        ):
+        has_loss = role in ("phase", "damping_coefficient") and ROLE_SETS["losses"] & set(roles)
+        if role in roles or role not in names or has_loss:
             continue
         is_beside_stiffness = role in ("frequency", "amplitude", "phase", "damping_coefficient")
-        if is_beside_stiffness and not {"stiffness", "storage_stiffness", "force_amplitude", "compliance"} & set(roles):
+        if is_beside_stiffness and not {"stiffness", "storage_stiffness", "force_amplitude", "compliance"} & {*roles}:
             continue
         is_certain = qualifier or is_beside_stiffness
         if motion is STRAINING and (role in ("force_amplitude", "damping_coefficient") or not is_certain):
@@ -93,11 +91,7 @@ def add_by_unit(table: Table, roles: dict[str, Column]) -> tuple[list[Caveat], l
             column
             for column, words in free.items()
             if (words & _QUALIFIERS[qualifier] if qualifier else role not in LOOP_COLUMNS or not words & amplitude)
-            and (
-                units.kelvin_scale(column.unit or "")
-                if role == "temperature"
-                else any(units.is_compatible(column.unit or "", si) for si in expected)
-            )
+            and any(units.is_compatible(column.unit or "", si) for si in expected)
             and is_like_number(str(table.first_row[column.index]))
         ]
         if len(fitting) == 1:
@@ -144,6 +138,30 @@ def add_half_differences(
             )
         notes.append(Caveat("column_difference", note))
     return notes
+
+
+def convert_roles(roles: dict[str, Column], certain: Collection[str]) -> Iterator[Caveat]:
+    """Give columns such as a damping ratio the role of the quantity that follows from their numbers.
+
+    A force amplitude beside a stiffness takes the role of a missing amplitude, unless its name may mean a static force.
+    The columns keep the name of their quantity in `Column.role`.
+
+    Args:
+        roles: columns found so far, by role such as "force"; changed in place.
+        certain: roles whose column the user states.
+
+    Yields:
+        A warning on each column whose name does not say how its numbers are converted.
+    """
+    for role, (into, _, _, why) in CONVERSIONS.items():
+        if role in roles and into not in roles:
+            roles[into] = roles.pop(role)
+            if why:
+                yield Caveat("column_converted", f'"{roles[into].header}" is read as {why}')
+    force = roles.get(role := "force_amplitude")
+    is_missing = "stiffness" in roles and "amplitude" not in roles
+    if force and is_missing and (role in certain or (plain_name(force.header), role) not in UNITS_OF):
+        roles["amplitude"] = force
 
 
 def name_parallel_spring(roles: dict[str, Column]) -> list[Caveat]:

@@ -27,13 +27,9 @@ _RUNS_OF_LOOPS = frozenset(map(plain, ("block", *WORDS["rows"]["run"])))
 #: Names of columns that mark rows as valid or not.
 _FLAGS = frozenset(map(plain, WORDS["rows"]["flag"]))
 #: Known names of columns that assign rows to tests: of directions, specimen numbers, part numbers and runs.
-_LABELS = Vocabulary(
-    {
-        "direction": WORDS["rows"]["direction"],
-        **{key: WORDS["above"][key] for key in ("specimen_number", "part_number")},
-        "run": [*SWEEP_COLUMNS["repeat"], "block", *WORDS["rows"]["run"]],
-    }
-)
+_PARTS = {key: WORDS["above"][key] for key in ("specimen_number", "part_number")}
+_RUNS = [*SWEEP_COLUMNS["repeat"], "block", *WORDS["rows"]["run"]]
+_LABELS = Vocabulary({"direction": WORDS["rows"]["direction"], **_PARTS, "run": _RUNS})
 
 
 class Rows(NamedTuple):
@@ -69,7 +65,7 @@ def same_text(text: str, reference: str) -> bool:
 
 
 def column_texts(table: Table, *indices: int) -> Iterator[ColumnTexts]:
-    """Find the texts of columns; an empty or merged cell has the text of the cell above.
+    """Find the texts of columns; an empty or merged cell has the text of the cell above, if there is one.
 
     Yields:
         Texts of the column with each index.
@@ -80,7 +76,8 @@ def column_texts(table: Table, *indices: int) -> Iterator[ColumnTexts]:
     for index in indices:
         cells = pd.concat([frame[index] for frame in blocks], ignore_index=True)
         texts = cells.map(lambda cell: _text(cell).strip(" #")).astype(object)
-        codes, distinct = pd.factorize(texts.mask(texts == "").ffill().fillna(""))
+        is_of_remarks = texts[:1].eq("").any()  # a column of merged cells does not begin empty
+        codes, distinct = pd.factorize(texts if is_of_remarks else texts.mask(texts == "").ffill())
         yield ColumnTexts(list(distinct), codes)
 
 
@@ -216,7 +213,7 @@ def note_not_understood(
         is_plain = explained or (is_number and counts.min() < _FEWEST_ROWS)
         if counts.size > 1 and (plain(header) in _FLAGS or not is_plain):
             values = sorted(texts.distinct[code] for code in present)
-            listed = ", ".join(values[:4]) + ", ..." * (len(values) > 4)
+            listed = ", ".join(value or "empty" for value in values[:4]) + ", ..." * (len(values) > 4)
             yield Caveat(
                 "column_not_understood",
                 f'"{header}" (column {index + 1}) varies from row to row ({listed}) and is not understood: all rows '

@@ -244,11 +244,6 @@ def rows_of_test(
     return rows, None if degrees is None else degrees[rows]
 
 
-def mean_temperature(degrees: Floats | None) -> float | None:
-    """Mean of temperatures [degC] in K, to 0.01 K; None without temperatures."""
-    return None if degrees is None else round(float(degrees.mean()), 2) + CELSIUS
-
-
 def split_conditions(table: Table, rows: NDArray[np.intp], stated: Mapping[str, Any]) -> list[dict[str, str]]:
     """Find the temperatures and preloads of the tests in a file.
 

@@ -8,14 +8,14 @@ import numpy as np
 
 from bushfit.caveat import Caveat
 from bushfit.geometry import ROTATION, Place
+from bushfit.reading.block_labels import note_coupon
 from bushfit.reading.finding import find_table
-from bushfit.reading.headers import LOOP_COLUMNS, Column
+from bushfit.reading.headers import LOOP_COLUMNS, Column, Vocabulary
 from bushfit.reading.labelled import Rows, note_not_understood
-from bushfit.reading.levels import mean_temperature, rows_of_test
+from bushfit.reading.levels import rows_of_test
 from bushfit.reading.measurement import FEWEST_LOOP_ROWS, Floats, Loop
 from bushfit.reading.parts import OpenedFile
-from bushfit.reading.preload import parse_preload
-from bushfit.reading.si_columns import quantity_above, si_column
+from bushfit.reading.si_columns import first_numbers, quantity_above, si_column
 from bushfit.reading.source import LEAST_VALUE
 from bushfit.reading.stated import LoopFile
 from bushfit.reading.table import Table
@@ -23,6 +23,10 @@ from bushfit.reading.times import DAY, HOUR, are_day_numbers, sampling_rate_abov
 
 #: Latest time of a record [s]; chosen: the year 5138 in seconds since 1970, or March 1973 in milliseconds.
 _LATEST_SECOND = 1e11
+#: Smallest time without a unit that is in nanoseconds since 1970, as databases write it; chosen: in 1973.
+_SMALLEST_NANOSECONDS = 1e17
+#: Names of a time; a column of another name that counts the rows is none.
+_TIMES = Vocabulary({"time": LOOP_COLUMNS["time"]})
 #: Relative difference up to which the step of a time agrees with a sampling rate; chosen: steps are rounded.
 _RATE_AGREEMENT = 0.02
 
@@ -64,14 +68,16 @@ def read_loop(
         if np.ptp(values[role][:FEWEST_LOOP_ROWS]) < LEAST_VALUE and np.ptp(values[role]) < LEAST_VALUE:
             raise table.error(f"the {role} never changes", column=wanted[role], expected="a loop")
     if displacement @ force < displacement.sum() * force.sum() / force.size:  # a negative covariance
-        raise table.error(
-            "the force falls where the displacement rises",
-            column=wanted["force"],
-            expected="force and displacement counted in the same direction",
-            hint="if the force has the opposite sign, write force_sign = -1 in the campaign"
-            if test.force_sign == 1
-            else "take force_sign = -1 out of the campaign",
-        )
+        sentence = f'"{wanted["force"].header}" falls where "{wanted["displacement"].header}" rises'
+        if test.force_sign is not None:
+            problem, hint = (
+                "the force falls where the displacement rises",
+                f"take force_sign = {test.force_sign} out of the campaign",
+            )
+            expected = "force and displacement counted in the same direction"
+            raise table.error(problem, column=wanted["force"], expected=expected, hint=hint)
+        values["force"] = force = -force
+        notes += (Caveat("reversed_force", f"{sentence}: the force has the opposite sign and is turned"),)
     if "time" in values:
         stuck = values["time"][1:] <= values["time"][:-1]
         copies = np.flatnonzero(stuck) + 1
@@ -88,21 +94,11 @@ def read_loop(
         if "time" in table.roles:
             sentence = f'"{table.roles["time"].header}" is not used, because the campaign states the time'
             notes += (Caveat("unused_time", sentence),)
-    unknown = note_not_understood(table, table.row_labels, selected)
-    temperature = mean_temperature(degrees) if test.temperature is None else test.temperature
-    return Loop(
-        name or table.file.stem,
-        direction,
-        time,
-        displacement,
-        force,
-        test.noise,
-        test.source(table.opened.checksum.result(), temperature, (*notes, *unknown)),
-        "time" in values or test.sampling_rate is not None,
-        test.weight,
-        temperature=temperature,
-        preload=parse_preload(test.preload, direction),
-    )
+    unknown = [*note_not_understood(table, table.row_labels, selected), *note_coupon(table, direction)]
+    checksum, has_time = table.opened.checksum.result(), "time" in values or test.sampling_rate is not None
+    properties = test.properties(direction, checksum, degrees, (*notes, *unknown))
+    name = name or table.file.stem
+    return Loop(name, direction, time, displacement, force, has_recorded_time=has_time, **properties)
 
 
 def loop_columns(table: Table, direction: Place, test: LoopFile) -> dict[str, Column]:
@@ -131,7 +127,7 @@ def loop_columns(table: Table, direction: Place, test: LoopFile) -> dict[str, Co
             f'{{ displacement = "{force}", force = "{displacement}" }}',
         )
     wanted = {role: si_column(table, role, direction) for role in ("displacement", "force")}
-    wanted["force"] = replace(wanted["force"], scale=test.force_sign * wanted["force"].scale)
+    wanted["force"] = replace(wanted["force"], scale=(test.force_sign or 1) * wanted["force"].scale)
     if "time" in table.roles and not test.states_time:
         wanted["time"] = time_column(table, direction)
     elif not test.states_time:
@@ -148,8 +144,14 @@ def time_column(table: Table, place: Place) -> Column:
     If its header has no unit, day numbers of a spreadsheet or a sampling rate above the table show the unit.
     """
     time = table.roles.get("time")
+    numbers = first_numbers(table, [time] if time else [])
+    if time and _TIMES.heading(time.header) is None and numbers.size > 2 and np.all(np.diff(numbers[:, 0]) == 1.0):
+        hint = 'state sampling_rate = "100 Hz" in the campaign, or the rate of the record, in place of this column'
+        raise table.error("this column counts the rows", column=time, expected="times", hint=hint)
     if time is None or time.unit or time.index in table.clocks:
         return si_column(table, "time", place)
+    if np.min(numbers, initial=np.inf) > _SMALLEST_NANOSECONDS:
+        return replace(time, scale=1e-9)
     with suppress(ValueError):  # which the reading of the table reports
         values = table.read({"time": time}, fewest_rows=2)[0]["time"]
         step = (values[-1] - values[0]) / (values.size - 1)

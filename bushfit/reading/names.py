@@ -60,26 +60,15 @@ _SPECIMEN_NUMBER = re.compile(
 #: Range of test temperatures [degC]; chosen: a number with a C outside this range is part of a part number.
 _TEMPERATURES = (-100.0, 300.0)
 #: Key of a campaign by each of its usual names above a table.
-_KEY_OF = {
-    plain(name): key
-    for key, names in {
-        **WORDS["above"],
-        "direction": WORDS["rows"]["direction"],
-        "preload": SWEEP_COLUMNS["preload"],
-    }.items()
-    for name in names
-}
+_STATED_ABOVE = {**WORDS["above"], "direction": WORDS["rows"]["direction"], "preload": SWEEP_COLUMNS["preload"]}
+_KEY_OF = {plain(name): key for key, names in _STATED_ABOVE.items() for name in names}
 #: Names of the step between rows, whose unit is that of the x axis, and names of this unit.
 _STEPS, _X_UNITS = (frozenset(map(plain, WORDS["rows_of"][key])) for key in ("steps", "x_units"))
 #: SI unit of the two keys for the time between rows.
 _SAMPLING = {"sampling_rate": "Hz", "sampling_interval": "s"}
 #: Usual names of amplitude and frequency above a table.
-_VOCABULARY = Vocabulary(
-    {
-        "frequency": SWEEP_COLUMNS["frequency"],
-        "amplitude": [*SWEEP_COLUMNS["amplitude"], *STRAINING_COLUMNS["amplitude"]],
-    }
-)
+_AMPLITUDES = [*SWEEP_COLUMNS["amplitude"], *STRAINING_COLUMNS["amplitude"]]
+_VOCABULARY = Vocabulary({"frequency": SWEEP_COLUMNS["frequency"], "amplitude": _AMPLITUDES})
 #: Separator between a name and its value above a table.
 _AFTER_KEY = re.compile(r"\t|;|:\s|:$|\s=\s|=|,(?!\d)|(?<=[^\W\d]),")
 #: Blank between a name and its value at the end of a line: "Sample rate 512 Hz".
@@ -108,6 +97,8 @@ _SHORT = {"ax": Direction.AXIAL, "rad": Direction.RADIAL, "tors": Direction.TORS
 _LETTERS = re.compile(r"[^\W\d_]+")
 #: Starts of words, and phrases, in remarks that may change what a test means.
 _REMARKS, _REMARK_PHRASES = tuple(WORDS["remarks"]["starts"]), re.compile("|".join(WORDS["remarks"]["phrases"]))
+#: Texts that name a coupon of rubber rather than a bushing.
+_COUPON = re.compile("|".join(WORDS["coupon"]["words"]))
 #: Word that is not a unit after a number.
 _WORD = re.compile(r"(?<![a-z\d.,])(?:[a-z]+)")
 
@@ -139,6 +130,7 @@ class Labels:
         part_number: number of the part, which replaces `specimen_number` above a table if that is not stated.
         sampling: sampling rate or interval of a record as its number and unit, separated by a blank.
         convention: convention of the amplitudes in the table.
+        force: force in a name without a word for its meaning; the preload if the names of several tests differ in it.
     """
 
     quantities: tuple[StatedQuantity, ...] = ()
@@ -151,6 +143,7 @@ class Labels:
     part_number: str | None = None
     sampling: str | None = None
     convention: AmplitudeConvention | None = None
+    force: str | None = None
 
     def of_dimension(self, unit: str) -> list[StatedQuantity]:
         """Return the distinct quantities with the dimension of an SI unit; if any is marked, only marked quantities."""
@@ -208,7 +201,9 @@ def _labels_in_name(name: str) -> Labels:
             is_plain = bool(is_sure) and not is_joined
             if (is_plain or word in _WORDS["temperature"]) and _TEMPERATURES[0] < value < _TEMPERATURES[1]:
                 values.setdefault("temperature", text)
-        elif unit in ("N", "kN") or value <= 0.0:
+        elif unit in ("N", "kN"):
+            values |= {} if is_joined else {"force": text}
+        elif value <= 0.0:
             continue
         elif unit in ("Hz", "mHz"):
             if word in _WORDS["frequency"] or not is_joined:
@@ -264,6 +259,11 @@ def is_remark(text: str) -> bool:
     return starts or _REMARK_PHRASES.search(folded(text)) is not None
 
 
+def names_coupon(text: str) -> bool:
+    """True if a text names a coupon or its standard, such as "Specimen: quad shear" or "ISO 1827"."""
+    return _COUPON.search(folded(text)) is not None
+
+
 def _name_and_values(line: Line) -> list[str]:
     """Cells of a line of text or row of a sheet: a name, then its values; one cell without a value."""
     if isinstance(line.content, str):
@@ -294,7 +294,7 @@ def _label_in_line(line: Line, x_unit: str) -> Labels:
     key, forms = _KEY_OF.get(plain(name)), (cells[1], " ".join(cells[1:3]), f"{cells[1]} {unit or ''}")
     if key in ("date", "operator", "specimen_number", "part_number"):
         is_header = plain(cells[1]) in _KEY_OF or units.split_header(cells[1])[1] is not None
-        is_value = len(cells[1]) <= _LONGEST_VALUE and not is_header
+        is_value = len(cells[1]) <= _LONGEST_VALUE and not (is_header or names_coupon(cells[1]))
         values = {key: cells[1]} if is_value else {}
         return Labels(**values)
     if key == "direction":
@@ -354,6 +354,5 @@ def direction_of_file(file: Path, headers: Iterable[str], *, turns: bool, sheet:
         turns: True if the displacement is an angle; the direction is then torsion unless another rotation is named.
         sheet: name of the sheet; None if there is none.
     """
-    names = (named_direction([name], short=True) for name in (sheet or "", file.stem))
-    direction = next(filter(None, names), None) or named_direction(headers)
+    direction = labels_in_names(sheet or "", file.stem).direction or named_direction(headers)
     return Direction.TORSION if turns and not (direction and direction.is_rotation) else direction

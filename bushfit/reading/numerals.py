@@ -193,8 +193,10 @@ def consistent_notations(
 
 
 def find_first_decimal(table: Table) -> str | None:
-    """Decimal mark of the first thousand numbers; None if they leave it open."""
-    return common_decimal(islice(_number_texts(table), _FIRST), _possible_numerals(table))
+    """Decimal mark of the first thousand numbers; None if these and the separator of columns leave it open."""
+    is_separator = table.layout.delimiter == "," and not table.source.may_contain(",", table.layout)
+    decimal = common_decimal(islice(_number_texts(table), _FIRST), _possible_numerals(table))
+    return decimal or ("." if is_separator else None)
 
 
 def common_decimal(cells: Iterable[tuple[Place, str]], ways: tuple[Numerals, ...] = ALL_NUMERALS) -> str | None:

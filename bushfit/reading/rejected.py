@@ -93,13 +93,11 @@ def note_left_out(table: Table, rows: Sequence[FaultyRow], count: int) -> Iterat
     """
     left_out = [row for row in rows if not table.layout.is_repeated([str(cell) for cell in row[1]])]
     if broken := _broken_rows(table, left_out):
-        raise table.error(
-            "rows are broken over two lines each",
-            line=broken[0][0],
-            found=", ".join(f"lines {first} and {second}" for first, second in broken[:_MOST_LISTED]),
-            expected=f"the {len(table.headers)} cells of a row on one line",
-            hint="join these lines; tables that were copied from a PDF often have such broken rows",
-        )
+        problem = "rows are broken over two lines each"
+        found = ", ".join(f"lines {first} and {second}" for first, second in broken[:_MOST_LISTED])
+        expected = f"the {len(table.headers)} cells of a row on one line"
+        hint = "join these lines; tables that were copied from a PDF often have such broken rows"
+        raise table.error(problem, line=broken[0][0], found=found, expected=expected, hint=hint)
     in_doubt = [row for row in left_out if row[2] in ("doubtful", "word")]
     is_much = len(in_doubt) > _MOST_WORDS or sum(fault == "doubtful" for *_, fault in in_doubt) > 1
     if is_much and len(in_doubt) > _MOST_LEFT_OUT * count and not _are_between_samples(in_doubt):
@@ -160,22 +158,24 @@ def bad_row(
             expected=f"{len(table.headers)} cells",
             hint="separate the columns by semicolons if numbers have a decimal comma" if commas else None,
         )
-    cell = cells[column.index]
-    if cell == "" and isinstance(table.source, Sheet) and table.source.lacks_values():
-        hint = "open it in a spreadsheet program and save it again"
-        return table.error("the workbook has formulas whose values were not saved", hint=hint)
+    if (cell := cells[column.index]) == "" and (lost := lost_formulas(table)):
+        return lost
     if count > 1 and filled <= column.index and next(table.rows(), None) is None:
         found, expected = f"{filled} cells", f"{len(table.headers)} cells: {', '.join(table.headers)}"
         hint = "add the column that is missing, or delete its name and unit from the file"
         problem = "all rows have fewer cells than the header"
         return table.error(problem, line=line, found=found, expected=expected, hint=hint)
-    return table.error(
-        "the cell is empty" if cell == "" else "this is not a finite number, or beyond the range of every rig",
-        line=line,
-        column=column,
-        found=f'"{cell}"{also}',
-        expected=f"a number such as 12{table.numerals.decimal}5",
-    )
+    problem = "the cell is empty" if cell == "" else "this is not a finite number, or beyond the range of every rig"
+    expected = f"a number such as 12{table.numerals.decimal}5"
+    return table.error(problem, line=line, column=column, found=f'"{cell}"{also}', expected=expected)
+
+
+def lost_formulas(table: Table) -> MeasurementError | None:
+    """Return the error for a workbook whose formulas have no saved values; None for any other table."""
+    if not (isinstance(table.source, Sheet) and table.source.lacks_values()):
+        return None
+    hint = "open it in a spreadsheet program and save it again"
+    return table.error("the workbook has formulas whose values were not saved", hint=hint)
 
 
 def check_positive(table: Table, wanted: Mapping[str, Column], values: Mapping[str, Floats]) -> None:
@@ -248,13 +248,11 @@ def refuse_other_columns(table: Table, left_out: Iterable[FaultyRow], vocabulary
             heading = vocabulary.heading(text)
             is_same = plain(name) == plain(split_unit(column.header)[0]) or (heading and heading.role == column.role)
             if is_header and not is_same:
-                raise table.error(
-                    "a header repeats the columns in another order",
-                    line=line,
-                    found=", ".join(filter(None, texts)),
-                    expected=f"the columns of line {table.layout.header_line}: {', '.join(table.headers)}",
-                    hint="write all blocks with the same columns, or each block to a separate file",
-                )
+                problem = "a header repeats the columns in another order"
+                found = ", ".join(filter(None, texts))
+                expected = f"the columns of line {table.layout.header_line}: {', '.join(table.headers)}"
+                hint = "write all blocks with the same columns, or each block to a separate file"
+                raise table.error(problem, line=line, found=found, expected=expected, hint=hint)
             if not (unit and column.unit) or unit == "-" or is_like_number(unit):
                 continue
             scales = [units.kelvin_scale(one) for one in (unit, column.unit)]

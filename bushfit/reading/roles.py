@@ -20,6 +20,10 @@ PAIRS = AGREEING_PAIRS + [(size, loss) for size, loss in map(str.split, WORDS["s
 CONDITIONS = ("temperature", "preload")
 #: Roles of columns that every operating point fills, and of columns that may be filled once for several.
 _OF_POINTS, _LEVELS = {role for pair in PAIRS for role in pair}, ("frequency", "amplitude", *CONDITIONS)
+#: Role that another column can take, factor and power that convert its numbers, and the reason in a note, by its role.
+CONVERSIONS = {
+    role: (into, float(factor), int(power), why) for role, (into, factor, power, why) in WORDS["converted"].items()
+}
 #: SI unit, or the attribute of a motion that is the SI unit, by role; all other roles are ratios.
 _UNITS = {role: unit for unit, roles in WORDS["si_units"].items() for role in roles}
 
@@ -43,6 +47,8 @@ def si_unit(role: str, motion: Motion) -> str:
         return "Pa*s" if motion is STRAINING else motion.stiffness_unit.replace("/", "*s/", 1)
     if role.endswith("compliance"):
         return {"N/m": "m/N", "Pa": "1/Pa"}.get(motion.stiffness_unit, "rad/N/m")
+    if role in ("velocity", "acceleration"):
+        return f"{motion.displacement_unit}/s{'^2' * (role == 'acceleration')}"
     if role == "energy":  # per cycle, in a test of strain per volume
         return "Pa" if motion is STRAINING else "J"
     unit = _UNITS.get(role, "1")
@@ -55,8 +61,14 @@ def is_unit_alone(header: str, vocabulary: Vocabulary) -> bool:
     return bool(name and unit) and unit != "-" and vocabulary.heading(header) is None and units.is_unit(unit or "")
 
 
+def with_conversions(roles: set[str]) -> set[str]:
+    """Add the roles that columns of some roles can take, such as "loss_factor" for a "damping_ratio"."""
+    return roles | {CONVERSIONS[role][0] for role in roles & CONVERSIONS.keys()}
+
+
 def is_test(roles: set[str]) -> bool:
     """Return True if columns of these roles are those of a loop or sweep; a force may be read as its amplitude."""
+    roles = with_conversions(roles)
     is_loop = "displacement" in roles and not roles.isdisjoint(("force", "force_amplitude"))
     return is_loop or (not roles.isdisjoint(_LEVELS[:2]) and any(set(pair) <= roles for pair in PAIRS))
 

@@ -6,7 +6,6 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,12 +17,14 @@ from bushfit.geometry import STRAINING, TRANSLATION, Place, strain_factor_of_fil
 from bushfit.reading.headers import (
     LOOP_COLUMNS,
     SWEEP_COLUMNS,
+    WORDS,
     Column,
     Heading,
     Vocabulary,
     parse_unit,
     plain,
     split_unit,
+    units_in_header,
 )
 from bushfit.reading.names import named_quantities
 from bushfit.reading.numerals import plainest_value
@@ -34,8 +35,6 @@ if TYPE_CHECKING:
 
 #: Number above zero of a stated multiple of a unit, such as 200 N for the force of 1 V.
 _MULTIPLE = re.compile(r"^(?=[\d.]*[1-9])\d+\.?\d*(?=\s+[^\W\d_])")
-#: Two units at the end of a header: "Force (kN) [N]", "Amplitude_mm [µm]".
-_TWO_UNITS = re.compile(r"[\[(_]([^\[\]()_]+)[\])]?\s*[\[(]([^\[\]()]+)[\])]$")
 #: Starts of the names of an angular frequency.
 _ANGULAR = ("angular", "angfreq", "omega", "ω", "kreisfrequenz", "pulsa", "角频率")
 #: Start of the name of a logarithm, in the spelling that `plain` returns.
@@ -67,11 +66,16 @@ def si_column(table: Table, role: str, tested: Place, hint: str | None = None) -
         MeasurementError: there is no such column.
         UnitError: the unit is missing, unknown, or of another dimension.
     """
-    label, expected = role.replace("_", " "), si_unit(role, tested.motion)
+    column = table.roles.get(role)
+    name = column.role if column else role
+    if role == "amplitude" and column and tested.motion is not STRAINING:
+        rates = (rate for rate in ("velocity", "acceleration") if table.agrees(role, si_unit(rate, tested.motion)))
+        name = next(rates, name)
+    label, expected = name.replace("_", " "), si_unit(name, tested.motion)
     quantity, example = units.common_unit(expected)
-    if expected == "Hz" and role in table.roles and is_angular(table.roles[role].header, "1/s"):
+    if expected == "Hz" and column and is_angular(column.header, "1/s"):
         quantity, example = "an angular frequency", "rad/s"
-    if role not in table.roles:
+    if column is None:
         refuse_other_motion(table, role)
         ways = ", ".join(filter(None, (columns_key(table, role, expected), hint)))
         raise table.header_error(
@@ -79,47 +83,35 @@ def si_column(table: Table, role: str, tested: Place, hint: str | None = None) -
             expected=f'a header such as "{label} [{example}]"',
             hint=f"state in the campaign {ways}",
         )
-    column = table.roles[role]
+    column = replace(column, role=name)
     if column.index in table.clocks:
         return column
-    place = table.place(table.layout.header_line, column)
-    unclear = partial(UnitError, file=table.file, place=place, found=f'"{column.header}"')
+    place, unit, problem = table.place(table.layout.header_line, column), column.unit or "1", ""
+    wanted, size = f"{quantity}, such as {example}", quantity_above(table, expected)
     if math.isnan(column.logarithm):
-        unit = column.unit or example
-        raise unclear(
-            f"the base of the logarithm of the {label} is not known",
-            expected="log10 or ln in the header",
-            hint=f'units = {{ {role} = "log10({unit})" }} in the campaign, or units = {{ {role} = "ln({unit})" }}',
-        )
-    if column.unit is None and column.logarithm:
-        raise unclear(
-            f"the logarithms of the {label} have no unit",
-            expected="the reference of decibels, such as dB re 1 N/mm, or the unit, as in log10(N/mm)",
-            hint=f'if the value 0 means 1 {example}, write units = {{ {role} = "{example}" }} in the campaign',
-        )
-    if column.unit is None and (expected != "1" or role in OF_MOTION):
-        second = {"phase": "rad", "time": "ms", "frequency": "Hz" if example == "rad/s" else ""}.get(role, "")
-        alternative = f', or units = {{ {role} = "{second}" }}' if second else ""
-        raise unclear(
-            f"the {label} has no unit",
-            expected=f"{quantity}, such as {example}",
-            hint=f'write "{column.header} [{example}]" in the header, '
-            f'or units = {{ {role} = "{quantity_above(table, expected) or example}" }} in the campaign{alternative}',
-        )
-    unit = column.unit or "1"
+        problem, wanted = f"the base of the logarithm of the {label} is not known", "log10 or ln in the header"
+        forms = (f'units = {{ {role} = "{kind}({column.unit or example})" }}' for kind in ("log10", "ln"))
+        hint = " in the campaign, or ".join(forms)
+    elif column.unit is None and column.logarithm:
+        problem = f"the logarithms of the {label} have no unit"
+        wanted = "the reference of decibels, such as dB re 1 N/mm, or the unit, as in log10(N/mm)"
+        hint = f'if the value 0 means 1 {example}, write units = {{ {role} = "{example}" }} in the campaign'
+    elif column.unit is None and (expected != "1" or role in OF_MOTION):
+        problem = f"the {label} has no unit"
+        second = "Hz" if example == "rad/s" else WORDS["second_units"].get(expected)
+        hint = f'write "{column.header} [{example}]" in the header, or '
+        hint += f'units = {{ {role} = "{size or example}" }} in the campaign'
+        hint += f', or units = {{ {role} = "{second}" }}' if second and not size else ""
+    elif not units.is_compatible(unit, expected) and units.is_compatible(unit, "V"):  # pint is slow to import
+        problem = f"the {label} is in volts"
+        hint = f"state the {label} of one volt, such as "
+        hint += f'units = {{ {role} = "{size or f"200 {example}"}" }} in the campaign'
+    if problem:
+        raise UnitError(problem, file=table.file, place=place, found=f'"{column.header}"', expected=wanted, hint=hint)
     foreign_units = ("m", "rad", "N/m", "N*m/rad") if table.motion is STRAINING else ("1", "Pa")
     is_foreign = any(units.is_compatible(unit, foreign_unit) for foreign_unit in foreign_units)
     if is_foreign and role in OF_MOTION and "force" not in role:
         refuse_other_motion(table, role, [column.header])
-    if not units.is_compatible(unit, expected) and units.is_compatible(unit, "V"):  # pint is slow to import
-        raise unclear(
-            f"the {label} is in volts",
-            expected=f"{quantity}, such as {example}",
-            hint=f"state the {label} of one volt, such as units = "
-            f'{{ {role} = "{quantity_above(table, expected) or f"200 {example}"}" }} in the campaign',
-        )
-    if role == "amplitude" and units.is_compatible(unit, "m/s^2") and expected == "m":
-        return replace(column, role="acceleration", scale=units.si_factor(unit, "m/s^2"))
     next_step = None
     if not units.is_unit(unit):
         size = unit if units.is_unit(_MULTIPLE.sub("", unit).strip()) else f"... {example}"
@@ -156,7 +148,10 @@ def columns_key(table: Table, role: str, unit: str) -> str:
         and unit != "1"
         and units.is_compatible(split_unit(header)[1] or parse_unit(in_row)[0], unit)
     ]
-    return " or ".join(f'columns = {{ {role} = "{header}" }}' for header in fitting[:3] or ["..."])
+    shared = ", or the sum of both in one column if two load cells share the load" * (
+        role == "force" and len(fitting) > 1
+    )
+    return " or ".join(f'columns = {{ {role} = "{header}" }}' for header in fitting[:3] or ["..."]) + shared
 
 
 def refuse_other_motion(table: Table, role: str, headers: Sequence[str] | None = None) -> None:
@@ -221,11 +216,14 @@ def column_of(table: Table, heading: Heading, index: int, stated_unit: str | Non
 
 
 def refuse_second_unit(table: Table, column: Column) -> None:
-    """Refuse a header that ends in two units of different size, such as "Force (kN) [N]"."""
-    match = _TWO_UNITS.search(column.header)
-    first, second = match.groups() if match else ("", "")
-    if units.is_compatible(first, second) and units.si_factor(first, second) != units.si_factor(second, second):
-        raise _two_units(table, column, [second, first])
+    """Refuse a header with two units of different size, such as "Force (kN) [N]" or "Kdyn_N_mm [kN/mm]"."""
+    unit = column.unit or ""
+    for other in units_in_header(column.header):
+        is_same_kind = units.is_compatible(other, unit) and other.lower() not in ("in", "strain")  # "Weg in [mm]"
+        are_both = all(any(units.is_compatible(one, si) for si in ("Hz", "rad/s")) for one in (other, unit))
+        is_angular_second = are_both and "Hz" in (other, unit) and "1/s" not in (other, unit) and not is_same_kind
+        if is_angular_second or (is_same_kind and units.si_factor(other, unit) != units.si_factor(unit, unit)):
+            raise _two_units(table, column, [unit, other])
 
 
 def _two_units(table: Table, column: Column, texts: Sequence[str]) -> UnitError:
@@ -236,7 +234,8 @@ def _two_units(table: Table, column: Column, texts: Sequence[str]) -> UnitError:
         place=table.place(table.layout.header_line, column),
         found=" and ".join(texts),
         expected="one unit, from the header or the units row",
-        hint=f'state the right one in the campaign: units = {{ {column.role} = "{texts[0]}" }}',
+        hint="state the right one in the campaign: "
+        + " or ".join(f'units = {{ {column.role} = "{text}" }}' for text in texts),
     )
 
 

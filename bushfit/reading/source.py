@@ -20,8 +20,9 @@ from bushfit.reading.lines import LONGEST_LINE, Line, split
 from bushfit.reading.numerals import APOSTROPHES, BLANKS
 from bushfit.units import SIZES
 
-#: Smallest positive value and largest magnitude of a number in a table [SI unit].
-LEAST_VALUE, LARGEST_VALUE = SIZES
+#: Smallest positive value and largest magnitude of a number in a table [SI unit]; the largest allows for nanoseconds
+#: since 1970.
+LEAST_VALUE, LARGEST_VALUE = SIZES[0], 1e19
 _LINE_END = re.compile(rb"\r\n|\n|\r")
 #: Bytes, or rows, at the end of a file that are searched for notes; chosen: room for a paragraph.
 _TAIL_BYTES, _TAIL_ROWS = 2048, 20

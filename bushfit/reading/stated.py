@@ -14,6 +14,7 @@ from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Direction, Place,
 from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS, AmplitudeConvention
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.measurement import Floats, Source, Stepped, Waveform, rebuild_time
+from bushfit.reading.preload import parse_preload
 from bushfit.units import CELSIUS, parse_quantity
 from bushfit.validation import (
     Count,
@@ -172,30 +173,34 @@ class TestFile(FileFormat):
     noise: Share | None = None
     weight: Annotated[float, Field(gt=0, le=1)] = 1.0
     temperature: Temperature | None = None
-    rows: Mapping[str, Text] = field(default_factory=dict)
+    rows: Mapping[str, str] = field(default_factory=dict)
     order: Count | None = None
     preload: Text | None = None
     date: Text | None = None
     operator: Text | None = None
     specimen_number: Text | None = None
 
-    def source(self, sha256: str, temperature: float | None, notes: Iterable[Caveat]) -> Source:
-        """Create the provenance of the test.
+    def properties(self, place: Place, sha256: str, degrees: Floats | None, notes: Iterable[Caveat]) -> dict[str, Any]:
+        """Collect what the campaign states of a measured test, and its provenance.
 
         Args:
+            place: direction of the bushing, or the specimen.
             sha256: SHA-256 of the file in hexadecimal digits.
-            temperature: temperature of the test [K], which is reported in degC; None if it is not known.
+            degrees: recorded temperatures [degC], whose mean is used if no temperature is stated; None without any.
             notes: warnings on how the file was read.
 
         Returns:
-            File, checksum, notes, and the conditions that are copied to the results.
+            Noise, weight, preload, temperature [K] or None, and source, by the names of the fields of Loop and Sweep.
         """
         conditions = {key: getattr(self, key) for key in ("order", "preload", "date", "operator", "specimen_number")}
-        degrees = None if temperature is None else round(temperature - CELSIUS, 6)
-        conditions = {
-            key: value for key, value in {**conditions, "temperature_degC": degrees}.items() if value is not None
-        }
-        return Source(Path(self.file), sha256, conditions, tuple(notes))
+        temperature = self.temperature
+        if temperature is None and degrees is not None:
+            temperature = round(float(degrees.mean()), 2) + CELSIUS
+        conditions["temperature_degC"] = None if temperature is None else round(temperature - CELSIUS, 6)
+        present = {key: value for key, value in conditions.items() if value is not None}
+        source = Source(Path(self.file), sha256, present, tuple(notes))
+        stated = {"noise": self.noise, "weight": self.weight, "preload": parse_preload(self.preload, place)}
+        return {**stated, "temperature": temperature, "source": source}
 
 
 @dataclass(frozen=True)
@@ -205,7 +210,7 @@ class LoopFile(TestFile):
     Args:
         columns: header or number of each column with an unusual name, by its role, such as force.
         units: units that the file does not state, by role.
-        force_sign: -1 if the load cell has the opposite sign.
+        force_sign: -1 if the load cell has the opposite sign; default automatic.
         sampling_rate: sampling rate [Hz], for a file without time that does not state it.
         rate: speed [m/s or rad/s, or 1/s], for a file without time.
         frequency: frequency of the waveform [Hz], for a file without time.
@@ -214,7 +219,7 @@ class LoopFile(TestFile):
 
     columns: Annotated[Mapping[str, Text], _roles(LOOP_COLUMNS, "header")] = field(default_factory=dict)
     units: Annotated[Mapping[str, Text], _roles(LOOP_COLUMNS, "unit")] = field(default_factory=dict)
-    force_sign: Literal[1, -1] = 1
+    force_sign: Literal[1, -1] | None = None
     sampling_rate: Frequency | None = None
     rate: Annotated[float, motion_quantity("/s"), Field(gt=0)] | None = None
     frequency: Frequency | None = None

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 
 from bushfit import units
 from bushfit.caveat import Caveat
-from bushfit.reading.headers import WORDS, Column, Vocabulary
+from bushfit.reading.headers import Column, Vocabulary
 from bushfit.reading.measurement import Complex, Floats
-from bushfit.reading.roles import AGREEING_PAIRS, OF_MOTION, PAIRS
+from bushfit.reading.roles import AGREEING_PAIRS, CONVERSIONS, OF_MOTION, PAIRS
 from bushfit.reading.si_columns import refuse_other_motion
 from bushfit.reading.stated import SweepFile
 from bushfit.reading.table import Table
@@ -24,13 +24,8 @@ LEAST_LOSS_FACTOR = 0.005
 _THROUGHOUT = 0.95
 #: Difference up to which redundant columns agree, relative to |K|; chosen: some are rounded to few digits.
 _AGREEMENT = 0.02
-#: Next steps for quantities from which the user can compute a column, by kind of quantity.
-_WAYS_ON = {
-    "decrement": 'divide the logarithmic decrement by pi, and write the quotient as "loss factor [-]" into the file',
-    "period": 'write the reciprocal of the period as "frequency [Hz]" into the file',
-    "quality": 'write the reciprocal of the quality factor as "loss factor [-]" into the file',
-}
-_DERIVED = Vocabulary(WORDS["derived"])
+#: Ratio of a quantity to the amplitude, as a text and its power, by its role.
+_OVER_AMPLITUDE = {"velocity": ("2 pi f", 1), "acceleration": ("(2 pi f)^2", 2), "force_amplitude": ("|K*|", 1)}
 #: Names of a damping that can be a loss factor or a damping ratio.
 _DAMPING = Vocabulary({"damping": ["damping", "damp", "Dämpfung", "amortissement", "amortiguamiento", "阻尼", "D"]})
 
@@ -54,15 +49,8 @@ def stiffness_pair(table: Table) -> tuple[str, str]:
     raise table.header_error(
         "no pair of columns gives a complex stiffness",
         expected=f"{usual}, or a force amplitude and its phase",
-        hint=hint_for_convertible_columns(table)
-        or 'correct the header, or name the columns in the campaign: columns = { stiffness = "..." }',
+        hint='correct the header, or name the columns in the campaign: columns = { stiffness = "..." }',
     )
-
-
-def hint_for_convertible_columns(table: Table, kinds: Collection[str] = _WAYS_ON) -> str | None:
-    """Advice on how to obtain a stiffness from a compliance or another column; None without such a column."""
-    headings = (_DERIVED.heading(header) for header in table.headers if header)
-    return next((_WAYS_ON[heading.role] for heading in headings if heading and heading.role in kinds), None)
 
 
 def refuse_ambiguous_damping(table: Table) -> None:
@@ -82,6 +70,31 @@ def refuse_ambiguous_damping(table: Table) -> None:
             expected="one of them, or a damping coefficient in N s/mm",
             hint=f"{' or '.join(keys)} or {coefficient} in the campaign",
         )
+
+
+def convert_values(
+    values: Mapping[str, Floats], columns: Mapping[str, Column]
+) -> tuple[dict[str, Floats], tuple[Caveat, ...]]:
+    """Convert columns that took the role of another quantity, such as a damping ratio or a velocity amplitude.
+
+    Args:
+        values: values in SI by role, (n,) each.
+        columns: columns by role; `Column.role` names the quantity that the numbers are.
+
+    Returns:
+        Values in SI by role, and a warning on an amplitude that was converted.
+    """
+    numbers, notes = dict(values), tuple[Caveat, ...]()
+    for role, column in columns.items():
+        _, factor, power, _ = CONVERSIONS.get(column.role, (role, 1.0, 1, ""))
+        numbers[role] = factor * values[role] ** power
+    amplitude = columns.get("amplitude")
+    if amplitude and amplitude.role in _OVER_AMPLITUDE:
+        divisor = numbers["stiffness"] if amplitude.role == "force_amplitude" else 2.0 * np.pi * numbers["frequency"]
+        text, power = _OVER_AMPLITUDE[amplitude.role]
+        numbers["amplitude"] /= divisor**power
+        notes = (Caveat("column_converted", f'"{amplitude.header}" divided by {text} is read as the amplitude'),)
+    return numbers, notes
 
 
 def with_positive_loss(
@@ -115,7 +128,7 @@ def with_positive_loss(
     size = np.median(values.get("storage_stiffness", values.get("stiffness", np.ones(1))))
     sizes = {"loss_stiffness": size, "loss_compliance": np.median(values.get("storage_compliance", np.ones(1)))}
     sizes["energy"] = np.median(np.abs(values.get("energy", np.ones(1))))
-    for role in ("phase", "loss_factor", "damping_coefficient", "damping_ratio", *sizes):
+    for role in ("phase", "loss_factor", "damping_coefficient", *sizes):
         if role not in corrected or role not in columns:
             continue
         share = corrected[role] / sizes.get(role, 1.0)
@@ -137,15 +150,13 @@ def complex_stiffness(pair: tuple[str, str], values: Mapping[str, Floats]) -> tu
 
     Notes:
         K* = K' + i K'' with K'' = 2 pi f c of a damping coefficient c, K'' = W / (pi x^2) of an energy W that is
-        dissipated in a cycle of amplitude x, and tan delta = 2 zeta of a damping ratio zeta.
+        dissipated in a cycle of amplitude x.
         A force amplitude F at a displacement amplitude x gives |K*| = F / x. A complex compliance J' - i J'' is the
         reciprocal of the stiffness. The loss factor is NaN from a phase of 90 deg on.
     """
     size, loss = values[pair[0]], values[pair[1]]
     if pair[0] == "storage_compliance":
         return np.reciprocal(size - 1j * loss), loss / size
-    if pair[0] == "compliance":
-        size = 1.0 / size
     if pair[0] == "force_amplitude":
         size = size / values["amplitude"]
     if pair[1] in ("loss_stiffness", "damping_coefficient", "energy"):
@@ -155,7 +166,7 @@ def complex_stiffness(pair: tuple[str, str], values: Mapping[str, Floats]) -> tu
             loss = loss / (np.pi * values["amplitude"] ** 2)
         storage = size if pair[0] == "storage_stiffness" else np.sqrt(size**2 - loss**2)
         return storage + 1j * loss, loss / storage
-    factor = 2.0 * loss if pair[1] == "damping_ratio" else loss
+    factor = loss
     if pair[1] == "phase":
         factor = np.where(np.abs(loss) < np.pi / 2, np.tan(loss), np.nan)
         if pair[0] != "storage_stiffness":
@@ -186,27 +197,22 @@ def check_stiffness(
         MeasurementError: the loss is implausible, or other columns give another stiffness; the sign of their loss is
             not compared.
     """
-    column = columns[pair[1]]
-    if np.mean(loss_factor < -LEAST_LOSS_FACTOR) > _THROUGHOUT:
-        raise table.error(
-            "the loss has the opposite sign",
-            column=column,
-            found=f"{np.count_nonzero(loss_factor < 0.0)} of {loss_factor.size} rows below zero",
-            expected="a force that leads the displacement: phase, loss factor and loss stiffness above zero",
-            hint="take phase_sign out of the campaign, or state phase_sign = -1",
-        )
+    column, problem = columns[pair[1]], ""
     largest = float(np.nan_to_num(np.abs(loss_factor), nan=np.inf).max())
-    scale = column.scale if pair[1] == "loss_factor" else 1.0
-    if scale != 1.0 and 0.0 < largest < LEAST_LOSS_FACTOR:
-        raise table.error(
-            "no rubber has a loss this small",
-            column=column,
-            found=f"{largest / scale:.3g} {column.unit} at most",
-            expected=f"a loss factor above {LEAST_LOSS_FACTOR / scale:g} {column.unit} somewhere",
-            hint=f'if these are ratios, write "[-]" for "[{column.unit}]" in the header',
-        )
+    scale = column.scale if column.role == "loss_factor" else 1.0
+    if np.mean(loss_factor < -LEAST_LOSS_FACTOR) > _THROUGHOUT:
+        problem = "the loss has the opposite sign"
+        found = f"{np.count_nonzero(loss_factor < 0.0)} of {loss_factor.size} rows below zero"
+        expected = "a force that leads the displacement: phase, loss factor and loss stiffness above zero"
+        hint = "take phase_sign out of the campaign, or state phase_sign = -1"
+    elif scale != 1.0 and 0.0 < largest < LEAST_LOSS_FACTOR:
+        problem, found = "no rubber has a loss this small", f"{largest / scale:.3g} {column.unit} at most"
+        expected = f"a loss factor above {LEAST_LOSS_FACTOR / scale:g} {column.unit} somewhere"
+        hint = f'if these are ratios, write "[-]" for "[{column.unit}]" in the header'
+    if problem:
+        raise table.error(problem, column=column, found=found, expected=expected, hint=hint)
     low, high = _LOSS_FACTORS
-    likelier = {"phase": "rad" if column.unit != "rad" else "deg", "loss_factor": "%"}.get(pair[1])
+    likelier = {"phase": "rad" if column.unit != "rad" else "deg", "loss_factor": "%"}.get(column.role)
     if likelier == "rad" and np.abs(values["phase"]).max() > 2.0 * np.pi * column.scale:
         likelier = None
     other_unit = f', perhaps units = {{ {pair[1]} = "{likelier}" }} in the campaign' if likelier else ""

@@ -13,19 +13,25 @@ from numpy.typing import NDArray
 from bushfit import units as si
 from bushfit.caveat import Caveat
 from bushfit.geometry import Place, strain_factor_of_files
+from bushfit.reading.block_labels import note_coupon
 from bushfit.reading.finding import find_table
 from bushfit.reading.headers import SWEEP_COLUMNS, WORDS, ZERO_TO_PEAK, AmplitudeConvention, Column
 from bushfit.reading.labelled import Rows, column_texts, note_not_understood
-from bushfit.reading.levels import mean_temperature, rows_of_test
+from bushfit.reading.levels import rows_of_test
 from bushfit.reading.measurement import Floats, Sweep
 from bushfit.reading.parts import OpenedFile
-from bushfit.reading.preload import parse_preload
 from bushfit.reading.rejected import check_positive
 from bushfit.reading.roles import AGREEING_PAIRS, si_unit
-from bushfit.reading.runs import runs_of
+from bushfit.reading.runs import Runs, runs_of
 from bushfit.reading.si_columns import si_column
 from bushfit.reading.stated import SweepFile
-from bushfit.reading.stiffness import check_stiffness, complex_stiffness, stiffness_pair, with_positive_loss
+from bushfit.reading.stiffness import (
+    check_stiffness,
+    complex_stiffness,
+    convert_values,
+    stiffness_pair,
+    with_positive_loss,
+)
 from bushfit.reading.table import Table
 
 #: Smallest number of rows of a sweep; chosen: fewer show no dependence on frequency or amplitude.
@@ -73,21 +79,14 @@ def read_sweep(
     rows = Rows(test.direction, test.specimen_number, test.rows, shared)
     table = find_table(file, SWEEP_COLUMNS, test.columns, test.units, test, direction.motion, rows)
     pair = stiffness_pair(table)
-    constants: dict[str, float] = {}
-    if test.at_frequency is not None:
-        constants["frequency"] = test.at_frequency
-    if at_amplitude is not None:
-        constants["amplitude"] = (
-            at_amplitude * strain_factor_of_files(direction) * ZERO_TO_PEAK[test.amplitude or "zero-to-peak"]
-        )
+    to_peak = strain_factor_of_files(direction) * ZERO_TO_PEAK[test.amplitude or "zero-to-peak"]
+    stated = {"frequency": test.at_frequency, "amplitude": at_amplitude and at_amplitude * to_peak}
+    constants = {role: value for role, value in stated.items() if value is not None}
     columns = sweep_columns(table, direction, pair, constants, test.amplitude)
     values, notes = table.read(columns, fewest_rows=_FEWEST_SWEEP_ROWS)
     table = table.needing(columns)
     check_positive(table, columns, values)
-    if "amplitude" in columns and columns["amplitude"].role == "acceleration":
-        values["amplitude"] /= (2.0 * np.pi * values["frequency"]) ** 2
-        sentence = f'"{columns["amplitude"].header}" is an acceleration: its amplitude is divided by (2 pi f)^2'
-        notes += (Caveat("acceleration_converted", sentence),)
+    values, converted = convert_values(values, columns)
     for role, value in constants.items():
         if role in columns:
             table.refuse(
@@ -106,8 +105,6 @@ def read_sweep(
     frequency = values["frequency"]
     points = (frequency, values["amplitude"])
     selected, degrees = rows_of_test(table, test, direction, frequency.size, points)
-    kelvin = test.temperature if degrees is None else degrees + si.CELSIUS
-    temperature = mean_temperature(degrees) if test.temperature is None else test.temperature
     repeat = _repeat_numbers(table, values)
     if repeat is None and (copies := _copied_rows(points, values.values())).any():
         selected = selected[~copies[selected]]
@@ -117,9 +114,14 @@ def read_sweep(
     frequency, amplitude = frequency[selected], values["amplitude"][selected]
     reached = values["amplitude_reached"][selected] if "amplitude_reached" in values else None
     runs = runs_of(frequency, amplitude, None if repeat is None else repeat[selected], test.stepped)
+    if "amplitude" in columns and columns["amplitude"].role == "force_amplitude":
+        runs = Runs(None, amplitude, runs.repeat)  # no amplitude is kept under a force that is
     if reached is None and not np.array_equal(runs.amplitude, amplitude):
         reached = amplitude
-    unknown = note_not_understood(table, table.row_labels, selected, frequency, runs.amplitude)
+    unknown = [*note_not_understood(table, table.row_labels, selected, frequency, runs.amplitude)]
+    unknown += note_coupon(table, direction)
+    notes = (*notes, *converted, *corrections, *unknown)
+    properties = test.properties(direction, table.opened.checksum.result(), degrees, notes)
     return Sweep(
         name or table.file.stem,
         direction,
@@ -127,14 +129,10 @@ def read_sweep(
         runs.amplitude,
         stiffness[selected],
         runs.repeat,
-        test.noise,
-        test.source(table.opened.checksum.result(), temperature, (*notes, *corrections, *unknown)),
-        reached,
-        runs.stepped,
-        values["relative_error"][selected] if "relative_error" in values else None,
-        weight=test.weight,
-        temperature=kelvin,
-        preload=parse_preload(test.preload, direction),
+        reached=reached,
+        stepped=runs.stepped,
+        relative_error=values["relative_error"][selected] if "relative_error" in values else None,
+        **{**properties, "temperature": test.temperature if degrees is None else degrees + si.CELSIUS},
     )
 
 
@@ -166,40 +164,31 @@ def sweep_columns(
     wanted = [role for role in ("frequency", "amplitude") if role in roles or role not in constants] + [*pair]
     wanted += [role for role in ("amplitude_reached", "relative_error") if role in roles]
     wanted += ["repeat"] if "repeat" in numeric else []
+    wanted += ["stiffness"] if "amplitude" in roles and roles["amplitude"].role == "force_amplitude" else []
     redundant = (role for other_pair in AGREEING_PAIRS if set(other_pair) <= set(roles) for role in other_pair)
     wanted += [role for role in redundant if table.agrees(role, si_unit(role, direction.motion))]
     columns = {role: si_column(table, role, direction, _HINTS.get(role)) for role in wanted}
-    in_header = columns["amplitude"].convention if "amplitude" in columns else None
+    amplitude, force = columns.get("amplitude"), columns.get("force_amplitude")
+    in_header, expected, problem = amplitude.convention if amplitude else None, "p-p, rms or 0-p in the header", ""
+    used = in_header or convention or "zero-to-peak"
     if in_header and convention and in_header != convention:
-        raise table.header_error(
-            "header and campaign state different conventions for the amplitudes",
-            column=columns["amplitude"],
-            found=f'{in_header} in the header, amplitude = "{convention}" in the campaign',
-            expected="one convention",
-            hint="correct one of them; what the header states needs no key in the campaign",
-        )
-    if not (in_header or convention) and "amplitude" in columns and _STROKE.match(columns["amplitude"].header):
-        raise table.header_error(
-            "this amplitude may be a stroke, which is peak-to-peak",
-            column=columns["amplitude"],
-            found=f'"{columns["amplitude"].header}"',
-            expected="p-p, rms or 0-p in the header",
-            hint='amplitude = "peak-to-peak" in the campaign, or amplitude = "zero-to-peak" if it is half the stroke',
-        )
-    convention = in_header or convention or "zero-to-peak"
-    force = columns.get("force_amplitude")
-    if force and not force.convention and convention != "zero-to-peak":
-        forms = ("p-p" if convention == "peak-to-peak" else "rms", "0-p")
+        problem, expected = "header and campaign state different conventions for the amplitudes", "one convention"
+        found = f'{in_header} in the header, amplitude = "{convention}" in the campaign'
+        hint = "correct one of them; what the header states needs no key in the campaign"
+    elif amplitude and not (in_header or convention) and _STROKE.match(amplitude.header):
+        problem, found = "this amplitude may be a stroke, which is peak-to-peak", f'"{amplitude.header}"'
+        hint = 'amplitude = "peak-to-peak" in the campaign, or amplitude = "zero-to-peak" if it is half the stroke'
+    elif force and not force.convention and used != "zero-to-peak":
+        problem = "the header does not state the convention of the force amplitudes"
+        found = f'"{force.header}" beside a displacement that is {used}'
+        forms = ("p-p" if used == "peak-to-peak" else "rms", "0-p")
         units = " or ".join(f'units = {{ force_amplitude = "{force.unit} {form}" }}' for form in forms)
-        raise table.header_error(
-            "the header does not state the convention of the force amplitudes",
-            found=f'"{force.header}" beside a displacement that is {convention}',
-            expected="p-p, rms or 0-p in the header",
-            hint=f"{units} in the campaign",
-        )
+        hint = f"{units} in the campaign"
+    if problem:
+        raise table.header_error(problem, found=found, expected=expected, hint=hint)
     for role in ("amplitude", "amplitude_reached", "force_amplitude"):
         if column := columns.get(role):
-            columns[role] = replace(column, scale=ZERO_TO_PEAK[column.convention or convention] * column.scale)
+            columns[role] = replace(column, scale=ZERO_TO_PEAK[column.convention or used] * column.scale)
     return columns
 
 

@@ -28,13 +28,14 @@ from bushfit.reading.rejected import (
     FaultyRow,
     bad_row,
     begins_other_table,
+    lost_formulas,
     mark_missing,
     note_left_out,
     refuse_other_columns,
     row_fault,
 )
 from bushfit.reading.roles import of_motion
-from bushfit.reading.source import LARGEST_VALUE, Channels, RowSource, Sheet, Text, cells_of
+from bushfit.reading.source import LARGEST_VALUE, Channels, RowSource, Text, cells_of
 from bushfit.reading.times import clock
 
 #: Number of first rows that are examined; chosen: a long record need not be read completely.
@@ -297,11 +298,8 @@ class Table:
             faulty = ((line, cells) for line, cells, fault in left_out if fault in ("doubtful", "missing"))
             if row := next(faulty, None):
                 raise bad_row(table, *row)
-            problem, hint = "too few rows", None
-            if isinstance(self.source, Sheet) and self.source.lacks_values():
-                problem = "the workbook has formulas whose values were not saved"
-                hint = "open it in a spreadsheet program and save it again"
-            raise self.error(problem, found=f"{count}", expected=f"at least {fewest_rows}", hint=hint)
+            few = self.error("too few rows", found=f"{count}", expected=f"at least {fewest_rows}")
+            raise lost_formulas(self) or few
         for role, column in wanted.items():
             if column.logarithm:
                 with np.errstate(over="ignore"):

@@ -127,7 +127,7 @@ LOOP_FAULTS: dict[str, Callable[[Loop], Loop]] = {
         x, displacement=x.displacement + 0.152
     ),
     "recorded about a mean force of 820 N, but no preload is stated": lambda x: replace(x, force=x.force + 820.0),
-    "state force_sign = -1 in the campaign": lambda x: replace(x, force=-x.force),
+    "the force has the opposite sign and is turned": lambda x: replace(x, force=-x.force),
 }
 
 

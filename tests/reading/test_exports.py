@@ -46,7 +46,7 @@ def check(measured: Loop | Sweep, reference: Mapping[str, np.ndarray], tolerance
     """Compare the columns of a test; points of a sweep in any order."""
     found = {name: getattr(measured, name) for name in reference}
     if "amplitude" in reference and isinstance(measured, Sweep):
-        orders = [np.lexsort((columns["frequency"], columns["amplitude"])) for columns in (found, reference)]
+        orders = [np.lexsort((columns["frequency"], columns["amplitude"].round(9))) for columns in (found, reference)]
         found, reference = (
             {name: values[order] for name, values in columns.items()}
             for columns, order in zip((found, reference), orders, strict=True)
@@ -100,6 +100,34 @@ def test_an_export_is_read_right_or_raises_a_question(initial, tmp_path, file_re
     cases = [name for name in CASES if name[0].lower() == initial]
     lines = [line for n, name in enumerate(cases) for line in (name, *read_case(CASES[name], tmp_path / str(n)))]
     file_regression.check("\n".join(lines) + "\n", basename=initial, encoding="utf-8", check_fn=references.check)
+
+
+def test_rows_without_a_remark_are_selected_as_inspect_prints(tmp_path):
+    (tmp_path / "export.csv").write_bytes((FILES / "a_remark_on_bad_rows.txt").read_bytes())
+    (sweep,) = inspected(tmp_path, "export.csv")[1]
+    campaign = tmp_path / "campaign.toml"
+    campaign.write_text(campaign.read_text() + 'rows = { "Remark" = "" }\n')
+    assert (sweep.frequency.size, load_campaign(campaign).sweeps[0].frequency.size) == (12, 10)
+    check(load_campaign(campaign).sweeps[0], expected("sweep"))
+
+
+@pytest.mark.parametrize("sheets", [True, False])
+def test_forces_in_names_that_differ_are_preloads(sheets, tmp_path):
+    """One file or sheet alone may state anything by a force in its name."""
+    rows = [line.split("\t") for line in (FILES / "plain_sweep.txt").read_text().splitlines()]
+    book, names = openpyxl.Workbook(), ["axial 1000 N", "axial 2,5 kN"]
+    for name in names:
+        sheet = book.create_sheet(name)
+        for row in rows:
+            sheet.append([float(cell) if cell[0].isdigit() else cell for cell in row])
+        (tmp_path / f"{name}.txt").write_bytes((FILES / "plain_sweep.txt").read_bytes())
+    del book["Sheet"]
+    book.save(tmp_path / "sheets.xlsx")
+    files = ["sheets.xlsx"] if sheets else [f"{name}.txt" for name in names]
+    document = json.loads(typing(tmp_path)("inspect", *files, "--json", "--no-plots").stdout)
+    assert [seen["facts"].get("from the name") for seen in document["files"]] == ["preload 1000 N", "preload 2.5 kN"]
+    document = json.loads(typing(tmp_path)("inspect", f"{names[0]}.txt", "--json", "--no-plots", "--force").stdout)
+    assert "from the name" not in document["files"][0]["facts"]
 
 
 @pytest.mark.parametrize(

@@ -51,7 +51,7 @@ def test_the_amplitude_in_a_name(name, text, convention):
         ("02c", {}),
         ("02C", {}),
         ("a 21c", {}),
-        ("2kN", {}),
+        ("2kN", {"force": "2 kN"}),
         ("0.02rad", {}),
         ("K_1_5mm", {}),
         ("F1_5kN 23_5C 1e-1mm", {}),

@@ -52,7 +52,7 @@ def inspection_figure(files: Sequence[Inspection], first: int = 0, count: int = 
     for row, file in enumerate(drawn_files):
         name = f"{file.file.parent.name}/{file.label}" if names[file.label] > 1 else file.label
         title = f"{shorten(name, 48)}: {file.kind}, {file.direction or 'direction unknown'}"
-        title += ", sign of the force reversed" * (file.entry.get("force_sign") == -1)
+        title += ", sign of the force reversed" * (any(warning.kind == "reversed_force" for warning in file.odd))
         title += f", {len(file.odd)} remarks" if file.odd else ""
         if isinstance(file.measured, Sweep):
             panel = _draw_sweep([figure.add_subplot(grid[row, column]) for column in (0, 1)], file.measured)
