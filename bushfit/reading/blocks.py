@@ -347,7 +347,8 @@ def _with_units_in_cells(source: RowSource, layout: Layout) -> tuple[RowSource, 
         names = [" ".join(word for word in words if plain(word) not in UNIT_NAMES)]
         if names[0] != " ".join(words):
             columns[index] = layout.headers.index(names[0]) if names[0] in layout.headers else index - 1
-    lines = [(line.number, [*cells_of(line, layout.delimiter)]) for line in source.lines(layout.lines_before_data)]
+    rows = source.lines(layout.lines_before_data) if columns else ()  # a long file is not read in vain
+    lines = [(line.number, [*cells_of(line, layout.delimiter)]) for line in rows]
     filled = [str(cells[index]) for _, cells in lines[:_FIRST] for index in columns if len(cells) > index]
     if -1 in columns.values() or not filled or not all(units.is_unit(text) for text in filled):
         return source, layout
