@@ -87,7 +87,7 @@ def si_column(table: Table, role: str, tested: Place, hint: str | None = None) -
     if column.index in table.clocks:
         return column
     place, unit, problem = table.place(table.layout.header_line, column), column.unit or "1", ""
-    wanted, size = f"{quantity}, such as {example}", quantity_above(table, expected)
+    wanted = f"{quantity}, such as {example}"
     if math.isnan(column.logarithm):
         problem, wanted = f"the base of the logarithm of the {label} is not known", "log10 or ln in the header"
         forms = (f'units = {{ {role} = "{kind}({column.unit or example})" }}' for kind in ("log10", "ln"))
@@ -97,7 +97,7 @@ def si_column(table: Table, role: str, tested: Place, hint: str | None = None) -
         wanted = "the reference of decibels, such as dB re 1 N/mm, or the unit, as in log10(N/mm)"
         hint = f'if the value 0 means 1 {example}, write units = {{ {role} = "{example}" }} in the campaign'
     elif column.unit is None and (expected != "1" or role in OF_MOTION):
-        problem = f"the {label} has no unit"
+        problem, size = f"the {label} has no unit", quantity_above(table, expected)
         second = "Hz" if example == "rad/s" else WORDS["second_units"].get(expected)
         hint = f'write "{column.header} [{example}]" in the header, or '
         hint += f'units = {{ {role} = "{size or example}" }} in the campaign'
@@ -105,7 +105,7 @@ def si_column(table: Table, role: str, tested: Place, hint: str | None = None) -
     elif not units.is_compatible(unit, expected) and units.is_compatible(unit, "V"):  # pint is slow to import
         problem = f"the {label} is in volts"
         hint = f"state the {label} of one volt, such as "
-        hint += f'units = {{ {role} = "{size or f"200 {example}"}" }} in the campaign'
+        hint += f'units = {{ {role} = "{quantity_above(table, expected) or f"200 {example}"}" }} in the campaign'
     if problem:
         raise UnitError(problem, file=table.file, place=place, found=f'"{column.header}"', expected=wanted, hint=hint)
     foreign_units = ("m", "rad", "N/m", "N*m/rad") if table.motion is STRAINING else ("1", "Pa")
