@@ -70,7 +70,7 @@ def document_lines(name: str, value: Any) -> Iterator[str]:
     elif isinstance(value, int | float) and not isinstance(value, bool):
         yield numbers_line(name, [value])
     elif value is not None:
-        yield f"{name}: {value}"
+        yield f"{name}: {CHANGING_TEXT.sub('', str(value))}"
 
 
 def table_lines(table: pd.DataFrame) -> Iterator[str]:
