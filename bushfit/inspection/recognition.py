@@ -98,9 +98,8 @@ def recognize_table(file: Path, test_options: Mapping[str, Any]) -> tuple[Table,
     column = columns_key(best, lacking, si_unit(lacking, best.motion))
     advice = f"correct the header, or name the column: {_LOSS_COLUMN if lacking == 'loss_factor' else column}"
     if set(best.roles) in ({"time", "displacement"}, {"time", "force"}) and '"..."' in column:
-        advice = f"a test needs a column for the {lacking}, too: if another file has it, join the two"
-        if lacking == "force":
-            advice = f"a displacement alone is a history for bushfit respond; {advice}"
+        history = "a displacement alone is a history for bushfit respond; " * (lacking == "force")
+        advice = f"{history}a test needs a column for the {lacking}, too: if another file has it, join the two"
     raise best.header_error(
         "the columns are not those of a test",
         kind=NoTestError,

@@ -112,8 +112,7 @@ def unpack(data: bytes, file: Path) -> bytes:
     try:
         return gzip.decompress(data) if data.startswith(b"\x1f\x8b") else data
     except (OSError, EOFError, zlib.error) as error:
-        hint = "copy or pack the file again"
-        raise MeasurementError("the packed file cannot be read", file=file, found=str(error), hint=hint) from error
+        raise MeasurementError("the file is damaged", file=file, found=str(error), hint="pack it again") from error
 
 
 def read_utf8(

@@ -65,9 +65,8 @@ class Numerals:
         mark = re.escape(self.decimal)
         forms = [rf"(?:\d+(?:{mark}\d*)?|{mark}\d+){EXPONENT}?"]
         if self.thousands:
-            forms.append(rf"[1-9]\d{{0,2}}(?:{_SEPARATORS[self.thousands]}\d{{3}})+(?:{mark}\d*)?")
-        if self.thousands == ",":  # India: 6,05,432
-            forms.append(rf"[1-9]\d?(?:,\d\d)+,\d{{3}}(?:{mark}\d*)?")
+            sign, digits = _SEPARATORS[self.thousands], "2,3" if self.thousands == "," else "3"  # India: 6,05,432
+            forms.append(rf"[1-9]\d{{0,2}}(?:{sign}\d{{{digits}}})*{sign}\d{{3}}(?:{mark}\d*)?")
         return re.compile(rf"{_SIGN}?(?:{'|'.join(forms)})", re.ASCII)
 
     def allows(self, text: str) -> bool:

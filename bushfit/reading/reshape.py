@@ -1,12 +1,13 @@
 """Reshape tables without a column for each quantity into long tables.
 
 A quantity may have a row of its own ("f [Hz]; 1; 2; 5"), rows that name it in a column ("5 Hz; K*; 600; N/mm"), a block
-of its own below those of other quantities.
+of its own below those of other quantities, or its name beside each number ("f=5 Hz K*=600 N/mm").
 """
 
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Sequence
 from itertools import islice, zip_longest
 
@@ -24,6 +25,8 @@ from bushfit.reading.source import Channels, RowSource, Sheet, cells_of
 _LEVEL = re.compile(r"(?<![\w.,])\d+(?:[.,]\d+)?\s?(?:[^\W\d]{1,3}|%)(?![^\W_])")
 #: Names of a column with the values of several quantities, which another column names.
 _VALUES = frozenset(map(plain, WORDS["rows_of"]["values"]))
+#: Name, number and unit, if any, in a line of a log: "f=5.00 Hz".
+_PAIR = re.compile(r"([^\W\d][^\s=]*)\s?=\s?([+-]?\d(?:[\d.,eE+-]*\d)?(?:\s?[^\s\d=,;][^\s=,;]*(?![^\s,;]))?)")
 #: First rows that show whether a column names quantities; chosen: more than a test has channels.
 _FIRST_ROWS = 50
 
@@ -42,10 +45,22 @@ def reshaped(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> Sheet
     if isinstance(source, Channels) or not layout.headers or layout.headerless:
         return None
     return (
-        _exchange_rows(source, layout, vocabulary)
+        _spread_pairs(source, vocabulary)
+        or _exchange_rows(source, layout, vocabulary)
         or _spread_names(source, layout, vocabulary)
         or _join_blocks(source, layout, vocabulary)
     )
+
+
+def _spread_pairs(source: RowSource, vocabulary: Vocabulary) -> Sheet | None:
+    """Make a row of each line of a log with the same names, such as "f=5.0 Hz A=0.1 mm", with a column for each."""
+    found = [_PAIR.findall(line.text) for line in source.head]
+    (names, count), *_ = Counter(tuple(name for name, _ in pairs) for pairs in found).most_common(1)
+    if 2 * count <= len(found) or not is_test(vocabulary.roles(names)):
+        return None
+    above = [[line.text] for line, pairs in zip(source.head, found, strict=True) if len(pairs) < 2]
+    rows = [[text for _, text in _PAIR.findall(line.text)] for line in source.lines(0)]
+    return Sheet(source.sheet or "", [*above, names, *(row for row in rows if len(row) == len(names))])
 
 
 def _spread_names(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> Sheet | None:

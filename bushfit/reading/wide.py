@@ -151,9 +151,9 @@ def unpivot(source: RowSource, layout: Layout, file: Path, vocabulary: Vocabular
             hint="write the tables of each direction into a sheet or file of their own",
         )
     sheet, long_layout = _long_table(columns, source, file, vocabulary)
-    summaries = dict.fromkeys(text for text in texts if is_summary_row([text]))
-    sentence = 'the column "{}" is left out, because it summarizes other columns'
-    notes = tuple(Caveat("summary_column", sentence.format(text)) for text in summaries)
+    summaries = [text for text in dict.fromkeys(texts) if is_summary_row([text])]
+    left_out = (f'the column "{text}" is left out, because it summarizes other columns' for text in summaries)
+    notes = tuple(Caveat("summary_column", sentence) for sentence in left_out)
     written = tuple(text for text in texts if any(m.role or m.stepped for m in _read_corner(text, vocabulary)))
     return sheet, replace(long_layout, delimiter=mark, written=written, notes=notes)
 
