@@ -142,8 +142,7 @@ def find_layout(
     if not lines:
         return Layout(delimiter or ",", (), 1, (), None)
     end, delimiters = _first_rows(lines, tuple(DELIMITERS.values()) if delimiter is None else (delimiter,))
-    stated = [index for index, line in enumerate(lines) if line.number == header_line]
-    before = range(end) if header_line is None else stated
+    before = range(end) if header_line is None else [n for n, line in enumerate(lines) if line.number == header_line]
     candidates = list(_candidates(lines, before, delimiters, vocabulary))
     if header_line is None and not any(is_test(vocabulary.roles(cells)) for *_, cells in candidates):
         below = _candidates(lines, range(end, len(lines)), delimiters, vocabulary)
@@ -297,8 +296,7 @@ def _layout(
     if scales := scales_above((split(line.content, delimiter) for line in lines[:index]), layout.headers):
         listed = ", ".join(f'"{layout.headers[n]}" {text}' for n, text in scales.items())
         note = Caveat("stated_unit", f"the lines above the table scale its columns: {listed}; offsets are left out")
-        row = tuple(scales.get(n, unit) for n, unit in enumerate(layout.units))
-        layout = replace(layout, units=row, notes=(note,))
+        layout = replace(layout, units=tuple(scales.get(n, unit) for n, unit in enumerate(layout.units)), notes=(note,))
     rows = [split(line.content, delimiter) for line in lines[index + 1 :] if line.number > layout.lines_before_data]
     layout = _with_unnamed_columns(layout, rows[:_LINES_BELOW_HEADER])
     numbered = bool(rows) and all(_NUMBERED.match(next(filter(None, cells), "")) for cells in rows)
