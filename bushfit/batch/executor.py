@@ -119,7 +119,14 @@ def dask_workers(address: str, warn: Callable[[str], object]) -> Workers:
         raise BatchError(problem, place="--scheduler", found=found, expected=expected, hint=hint) from None
 
     def count() -> int:
-        """Count the worker threads of the cluster, and wait for the first one; a lost cluster raises a BatchError."""
+        """Count the worker threads of the cluster, after a wait for the first one.
+
+        Returns:
+            Number of threads.
+
+        Raises:
+            BatchError: no worker comes, or the connection is lost.
+        """
         hint = "the same command with --resume continues from here"
         with suppress(OSError, RuntimeError):
             if client.status == "running" and not client.nthreads():

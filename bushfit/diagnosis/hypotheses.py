@@ -334,8 +334,8 @@ def mean_parameters(hypotheses: Sequence[Hypothesis], names: Sequence[str]) -> t
     mean = np.clip(weights @ means, means.min(axis=0), means.max(axis=0))  # rounding may leave their range
     matrix = np.einsum("n,ni,nj->ij", weights, means - mean, means - mean)
     for weight, (_, covariance) in zip(weights, pairs, strict=True):
-        known = covariance.restricted(names)
-        indices = [names.index(name) for name in known.names]
-        matrix[np.ix_(indices, indices)] += weight * known.matrix
+        restricted = covariance.restricted(names)
+        indices = [names.index(name) for name in restricted.names]
+        matrix[np.ix_(indices, indices)] += weight * restricted.matrix
     determined = [name for _, covariance in pairs for name in covariance.names]
     return dict(zip(names, mean.tolist(), strict=True)), Covariance(tuple(names), matrix).restricted(determined)

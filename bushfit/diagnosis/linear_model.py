@@ -80,9 +80,9 @@ class Projection:
         free = np.linalg.solve(root, products[:, 1:] / scale[:, None])
         projections = products[:, 0] - np.einsum("ck,ckg->cg", self.free, free)
         absorbed = np.concatenate((smooth, free), axis=1).swapaxes(1, 2)  # (c, columns, q + k)
-        for batch, within in zip(groups.batches, groups.within(used), strict=True):
+        for batch, in_block in zip(groups.batches, groups.within(used), strict=True):
             of_blocks = absorbed[:, batch.columns]
-            gram = within[index] - of_blocks @ of_blocks.swapaxes(-1, -2)
+            gram = in_block[index] - of_blocks @ of_blocks.swapaxes(-1, -2)
             yield batch, projections[:, batch.columns], gram
 
 
@@ -266,16 +266,16 @@ class LinearModel:
         scale, information = _scale_information(grams[:, 0], rows, wide)
         covariance = np.linalg.inv(information) / np.outer(scale, scale)
         shift = np.einsum("nij,nj->ni", covariance, projections[:, 0])
-        amount, variance, along = shift[:, -1:], covariance[:, -1, -1:], covariance[:, :, -1]
+        amount, variance, cross = shift[:, -1:], covariance[:, -1, -1:], covariance[:, :, -1]
         deviates = self.rig.deviation[self.cases] > 0.0
         total = variance + np.square(SIZES) * deviates[:, None]  # (cases, sizes)
         base = np.where(self.rig.is_plain[self.cases] | deviates, self.over_cases[0], -np.inf)
         gain = 0.5 * (np.log(variance / total) + np.square(amount) * (1.0 / variance - 1.0 / total))
         share = softmax(base[:, None] + gain)
-        means = shift[:, None] - along[:, None] * (amount / total)[..., None]
+        means = shift[:, None] - cross[:, None] * (amount / total)[..., None]
         mean = np.einsum("ns,nsi->i", share, means)
         matrix = np.einsum("n,nij->ij", share.sum(axis=1), covariance)
-        matrix -= np.einsum("n,ni,nj->ij", np.sum(share / total, axis=1), along, along)
+        matrix -= np.einsum("n,ni,nj->ij", np.sum(share / total, axis=1), cross, cross)
         matrix += np.einsum("ns,nsi,nsj->ij", share, means - mean, means - mean)
         return -mean[:-1], matrix[:-1, :-1]
 

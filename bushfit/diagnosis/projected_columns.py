@@ -48,33 +48,33 @@ class RigRows:
             shared[:, number, : len(block.kinds)] = weighted @ self.rows[:, rows - self.first].T
         return shared
 
-    def inner(self, other: RigRows, combinations: Array) -> Array:
+    def inner(self, second: RigRows, combinations: Array) -> Array:
         """Inner products X^T S^-1 Y with the changes Y of another set.
 
         Args:
-            other: the other set, of m2 changes.
+            second: the other set, of m2 changes.
             combinations: indices of c assumed sizes of the rig's errors, see `RigErrors.combinations`, (c,).
 
         Returns:
             Products, (c, m, m2).
         """
-        if len(self.rows) > len(other.rows):  # the smaller set is weighted
-            return other.inner(self, combinations).swapaxes(1, 2)
+        if len(self.rows) > len(second.rows):  # the smaller set is weighted
+            return second.inner(self, combinations).swapaxes(1, 2)
         weights, scatter = self.rig.weights
-        size, products = len(self.rows), np.empty((len(combinations), len(self.rows), len(other.rows)))
-        begin = max(self.first, other.first)  # of the residuals that both sets change
-        end = max(min(sets.first + sets.rows.shape[1] for sets in (self, other)), begin)
-        mine, others = (sets.rows[:, begin - sets.first : end - sets.first] for sets in (self, other))
+        size, products = len(self.rows), np.empty((len(combinations), len(self.rows), len(second.rows)))
+        begin = max(self.first, second.first)  # of the residuals that both sets change
+        end = max(min(sets.first + sets.rows.shape[1] for sets in (self, second)), begin)
+        own_rows, second_rows = (sets.rows[:, begin - sets.first : end - sets.first] for sets in (self, second))
         for number in np.unique(scatter[combinations]):
             chosen = scatter[combinations] == number
             kernels = self.rig.kernels[0][:, combinations[chosen]]
             blocks, count, width, _ = kernels.shape
             errors = kernels.reshape(blocks, count * width, width) @ self.shared[number]
             errors = errors.reshape(blocks, count, width, size).transpose(1, 3, 0, 2)
-            shared = other.shared[number].reshape(blocks * width, len(other.rows))
+            shared = second.shared[number].reshape(blocks * width, len(second.rows))
             among_errors = errors.reshape(count * size, blocks * width) @ shared  # in one product, which is fast
-            among_errors = among_errors.reshape(count, size, len(other.rows))
-            of_scatter = mine * weights[number, begin:end] @ others.T
+            among_errors = among_errors.reshape(count, size, len(second.rows))
+            of_scatter = own_rows * weights[number, begin:end] @ second_rows.T
             products[chosen] = np.subtract(of_scatter, among_errors, out=among_errors)
         return products
 
@@ -179,7 +179,7 @@ class GroupSet:
     @cached_property
     def batches(self) -> list[Batch]:
         """Columns in blocks of equal width: a block for each group that acts together, and for every other column."""
-        first, alike = 0, defaultdict[tuple[int, bytes], list[tuple[int, Array, int]]](list)
+        first, by_shape = 0, defaultdict[tuple[int, bytes], list[tuple[int, Array, int]]](list)
         units = dict[tuple[int, bytes], Array]()
         for number, group in enumerate(self.groups):
             rows = np.arange(first, first := first + len(group.columns))
@@ -187,8 +187,8 @@ class GroupSet:
             blocks = rows[None] if group.act_together else rows[:, None]
             key = blocks.shape[1], unit.tobytes()
             units[key] = unit
-            alike[key] += [(number, block, group.sign) for block in blocks]
-        arrays = [[np.array(values) for values in zip(*blocks, strict=True)] for blocks in alike.values()]
+            by_shape[key] += [(number, block, group.sign) for block in blocks]
+        arrays = [[np.array(values) for values in zip(*blocks, strict=True)] for blocks in by_shape.values()]
         return [
             Batch(groups, columns, signs, unit)
             for (groups, columns, signs), unit in zip(arrays, units.values(), strict=True)

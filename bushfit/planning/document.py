@@ -205,7 +205,15 @@ def plan_document(
 
 
 def planned_run(test: Test, minutes: float) -> PlannedRun:
-    """Make the entry of plan.json for one run of a test, which takes `minutes` with the change of direction before."""
+    """Make the entry of plan.json for one run of a test.
+
+    Args:
+        test: test of the plan.
+        minutes: duration, with the change of direction before the run.
+
+    Returns:
+        Entry with amplitudes in the unit of the direction.
+    """
     frequencies, amplitudes = (np.unique(axis).tolist() for axis in operating_points(test))
     return {
         "place": str(test.direction),

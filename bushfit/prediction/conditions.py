@@ -46,9 +46,9 @@ class PredictedPlace:
     def add_conditions(self, text: str) -> str:
         """Add preload and temperature, if known, to a text: "axial at a preload of 500 N and 60 degC"."""
         preload, temperature = self.conditions.preload, self.conditions.temperature
-        known = [] if preload is None else [f"a preload of {preload.text(self.direction)}"]
-        known += [] if temperature is None else [f"{number(float(temperature) - CELSIUS, 3)} degC"]
-        return f"{text} at {' and '.join(known)}" if known else text
+        conditions = [] if preload is None else [f"a preload of {preload.text(self.direction)}"]
+        conditions += [] if temperature is None else [f"{number(float(temperature) - CELSIUS, 3)} degC"]
+        return f"{text} at {' and '.join(conditions)}" if conditions else text
 
     @property
     def label(self) -> str:

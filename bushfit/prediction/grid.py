@@ -91,6 +91,9 @@ def grid_settings(options: Mapping[str, object], campaign: Campaign | None = Non
     Args:
         options: directions and operating points, as of `GridOptions`.
         campaign: campaign; None without one.
+
+    Returns:
+        Settings, in which an empty value stands for the default.
     """
     requested: dict[str, Any] = {
         key: tuple(value if isinstance(value, str) else float(value) for value in values)

@@ -111,7 +111,11 @@ def find_remarks(table: Table) -> tuple[Caveat, ...]:
 
 
 def note_coupon(table: Table, place: Place) -> Iterator[Caveat]:
-    """Warn if the texts of a file name a coupon of rubber, but its test is read as one of a bushing."""
+    """Warn if the texts of a file name a coupon of rubber, but its test is read as one of a bushing.
+
+    Yields:
+        The warning, or nothing.
+    """
     texts = [table.file.stem, table.source.sheet or "", *(line.text for line in table.lines_above), *table.headers]
     if not isinstance(place, Specimen) and (named := [text for text in texts if names_coupon(text)]):
         sentence = (
@@ -138,14 +142,14 @@ def label_columns(
         One text or number per block, by header: quantities that all blocks state, conditions, direction, part, and
         block number.
     """
-    stated = [stated_above(lines, vocabulary) for lines in above]
-    for before, after in pairwise(stated):
+    blocks = [stated_above(lines, vocabulary) for lines in above]
+    for before, after in pairwise(blocks):
         new = set(map(_role, after))
         after |= {header: value for header, value in before.items() if _role(header) in {*_HOLDING} - new}
     columns: dict[str, list[str | float]] = {}
-    for header in dict.fromkeys(header for one in stated for header in one):
+    for header in dict.fromkeys(header for block in blocks for header in block):
         role = _role(header)
-        values = [one.get(header, _HOLDING.get(role)) for one in stated]
+        values = [block.get(header, _HOLDING.get(role)) for block in blocks]
         distinguishes = len(set(values)) > 1 or role in ("amplitude", "frequency", "direction", *CONDITIONS)
         if role not in roles and distinguishes and None not in values:
             columns[header] = [value for value in values if value is not None]
@@ -155,7 +159,7 @@ def label_columns(
     are_runs = names == {""} or all(map(_RUNS.heading, names))
     if not columns and len(set(titles)) > 1 and are_titles and (are_sides or len(names) > 1 or are_runs):
         columns["repeat" if are_runs else "part"] = list(titles)
-    return columns | {"block": [str(number) for number in range(1, len(stated) + 1)]}
+    return columns | {"block": [str(number) for number in range(1, len(blocks) + 1)]}
 
 
 def is_of_block(line: Line, columns: Sequence[str], vocabulary: Vocabulary) -> bool:
@@ -169,8 +173,9 @@ def is_of_block(line: Line, columns: Sequence[str], vocabulary: Vocabulary) -> b
     Returns:
         True or False; a line for all blocks is False.
     """
-    stated = stated_above([line], vocabulary)
-    return any(header in columns or _role(header) in ("amplitude", "frequency") for header in stated)
+    return any(
+        header in columns or _role(header) in ("amplitude", "frequency") for header in stated_above([line], vocabulary)
+    )
 
 
 def stated_above(lines: Sequence[Line], vocabulary: Vocabulary) -> dict[str, str | float]:
@@ -184,25 +189,25 @@ def stated_above(lines: Sequence[Line], vocabulary: Vocabulary) -> dict[str, str
         Number or text by header of the column that would contain it, such as "amplitude [mm]".
     """
     labels = labels_and_text_above(lines) | labels_in_names(lines[-1].text if lines else "")
-    stated: dict[str, str | float] = {}
+    values: dict[str, str | float] = {}
     for si in ("m", "rad", "1", "Hz"):
         matches, role = labels.of_dimension(si), "frequency" if si == "Hz" else "amplitude"
         if len(matches) == 1:
-            stated[f"{role}{COUNTED[matches[0].convention]} [{matches[0].unit}]"] = float(matches[0].text.split()[0])
+            values[f"{role}{COUNTED[matches[0].convention]} [{matches[0].unit}]"] = float(matches[0].text.split()[0])
     for role in CONDITIONS:
         number, _, unit = (getattr(labels, role) or "").strip().partition(" ")
-        stated |= {f"{role} [{unit}]": float(number)} if number else {}
+        values |= {f"{role} [{unit}]": float(number)} if number else {}
     if direction := labels.direction or named_direction(line.text for line in lines):
-        stated["direction"] = str(direction)
+        values["direction"] = str(direction)
     if labels.specimen_number:
-        stated["part"] = labels.specimen_number
+        values["part"] = labels.specimen_number
     for name, (number, unit) in (item for line in lines for item in named_quantities(line).items()):
         heading = vocabulary.heading(f"{name} [{unit}]")
         if heading is None and name and units.is_unit(unit):
-            stated[name] = f"= {number} {unit}"  # a text, because the unit says nothing about its role
+            values[name] = f"= {number} {unit}"  # a text, because the unit says nothing about its role
         elif heading and heading.role in CONDITIONS:
-            stated.setdefault(f"{heading.role} [{unit}]", float(number))
-    return stated
+            values.setdefault(f"{heading.role} [{unit}]", float(number))
+    return values
 
 
 def _role(header: str) -> str:

@@ -43,7 +43,7 @@ def workbook(data: bytes, _: Path) -> Iterator[Sheet]:
     """
     import python_calamine as calamine
 
-    contents, shown = _xml_of_sheets(data)
+    contents, meanings = _xml_of_sheets(data)
     book = calamine.load_workbook(io.BytesIO(data))
     visible_names = {sheet.name for sheet in book.sheets_metadata if sheet.visible == calamine.SheetVisibleEnum.Visible}
     cells_left = _MOST_CELLS
@@ -54,7 +54,7 @@ def workbook(data: bytes, _: Path) -> Iterator[Sheet]:
             raise _too_large(f'more, with sheet "{name}"')
         rows = [_row(row) for row in sheet.to_python(skip_empty_area=False)]
         divided = 0
-        for row, column, (factor, unit) in _cells_with(shown, xml):
+        for row, column, (factor, unit) in _cells_with(meanings, xml):
             if row < len(rows) and column < len(rows[row]) and isinstance(value := rows[row][column], float):
                 rows[row][column] = f"{factor * value:.12g}{unit}"
                 divided += factor < 1.0
@@ -78,8 +78,8 @@ def _xml_of_sheets(data: bytes) -> tuple[dict[str, bytes], dict[str, tuple[float
     """Read the parts of an xlsx workbook that the library for workbooks does not evaluate.
 
     Returns:
-        XML of each sheet by its name, and the factor and unit with which cells show their number (see `_shown`) by
-        the number of their style, for styles that change it; both are empty for other formats.
+        XML of each sheet by its name, and factor and unit of the numbers in a cell (see `_factor_and_unit`) by the
+        number of its style, for styles with another factor or a unit; both are empty for other formats.
 
     Raises:
         MeasurementError: sheets are too large, or have a very distant cell (the reader allocates all cells up to it).
@@ -109,14 +109,16 @@ def _xml_of_sheets(data: bytes) -> tuple[dict[str, bytes], dict[str, tuple[float
         for sheet in book
         if sheet.tag.endswith("}sheet")
     }
-    own = {one.get("numFmtId", ""): str(one.get("formatCode")) for one in styles if one.tag.endswith("}numFmt")}
+    custom = {one.get("numFmtId", ""): str(one.get("formatCode")) for one in styles if one.tag.endswith("}numFmt")}
     cell_styles = next((list(one) for one in styles if one.tag.endswith("}cellXfs")), [])
-    formats = [{**_PERCENTAGES, **own}.get(style.get("numFmtId", ""), "") for style in cell_styles]
-    shown = {str(style): meaning for style, code in enumerate(formats) if (meaning := _shown(code)) != (1.0, "")}
-    return {name: contents.get(f"xl/{target}", b"") for name, target in sheets.items()}, shown
+    formats = [{**_PERCENTAGES, **custom}.get(style.get("numFmtId", ""), "") for style in cell_styles]
+    meanings = {
+        str(style): meaning for style, code in enumerate(formats) if (meaning := _factor_and_unit(code)) != (1.0, "")
+    }
+    return {name: contents.get(f"xl/{target}", b"") for name, target in sheets.items()}, meanings
 
 
-def _shown(code: str) -> tuple[float, str]:
+def _factor_and_unit(code: str) -> tuple[float, str]:
     """Factor and unit with which a number format, such as "0.0%", shows a number; 1 and "" if it shows neither."""
     if (match := _FORMAT_END.search(code)) is None:
         return 1.0, ""
