@@ -80,10 +80,8 @@ _SYMBOL = re.compile(r"\|?[a-z]{1,4}(?:\*|'{1,2})\|?|\|[a-z]\|")
 _UNLIKE_SYMBOL = frozenset(
     plain_word for kind in ("not_measured", "real", "imaginary") for plain_word in WORDS["qualifiers"][kind]
 )
-#: Symbol of a travel over its unit, which is no unit of seconds: "s / mm".
-_TRAVEL = re.compile(r"s\s*/")
-#: Quotation mark that means two primes: G".
-_TWO_PRIMES = re.compile(r"(?<![^\W_])([A-Za-z])\"")
+#: Symbol of a travel over its unit, which is no unit of seconds: "s / mm"; and quotation mark for two primes: G".
+_TRAVEL, _TWO_PRIMES = re.compile(r"s\s*/"), re.compile(r"(?<![^\W_])([A-Za-z])\"")
 #: Words that do not change the meaning of a channel.
 _ASIDES = re.compile(r"\b(?:axial|radial|torsional|measured|actual|gemessen|mesure|medido|ist)\b")
 #: Words for the mean of several parts, which do not change the meaning of a stiffness or its loss.
@@ -118,12 +116,10 @@ _CONVENTIONS = [
 _EXTREMES: list[tuple[re.Pattern[str], Extreme]] = [
     (re.compile("|".join(WORDS["conventions"][extreme]).format(**_PARTS)), extreme) for extreme in get_args(Extreme)
 ]
-#: Boundary of words in "AmpPkPk".
-_CAMEL = re.compile(r"(?<=[a-z]{2})(?=[A-Z])")
 #: Characters of the longest header that is compared; chosen: longer texts are not names.
 _LONGEST_HEADER = 200
-_EMPTY_BRACKETS = re.compile(r"[\[(]\s*[\])]")
-#: Comma that remains after a convention was removed: "(mm, )".
+#: Boundary of words in "AmpPkPk"; brackets and comma that remain after a convention was removed: "()", "(mm, )".
+_CAMEL, _EMPTY_BRACKETS = re.compile(r"(?<=[a-z]{2})(?=[A-Z])"), re.compile(r"[\[(]\s*[\])]")
 _DANGLING = re.compile(r"\s*[,;]\s*(?=[\])]|$)|(?<=[\[(])\s*[,;]\s*")
 #: Full-width brackets and typographic primes as plain signs; quotation marks are dropped.
 _SPELLINGS: dict[int, int | str] = {

@@ -42,12 +42,11 @@ _LINES_BELOW_HEADER = 8
 _DESCRIPTIONS = UNIT_NAMES | frozenset(map(plain, WORDS["rows_of"]["descriptions"]))
 #: Letter, which each name of a column has; and a number with a number sign: "#1".
 _LETTER, _NUMBERED = re.compile(r"[^\W\d_]"), re.compile(r"#\s?\d+\b")
-#: Blanks between a name and the bracket of its unit, which do not separate columns.
-_BLANK_BEFORE_BRACKET = re.compile(r" {1,8}(?=[\[(])")
+#: Blanks between a name and the bracket of its unit, which do not separate columns; and cell of a line whose columns
+#: are separated by wide gaps.
+_BLANK_BEFORE_BRACKET, _CELL = re.compile(r" {1,8}(?=[\[(])"), re.compile(r"\S+(?: \S+)*")
 #: Wide gap, which is shortened to two blanks; and gap between columns whose headers contain single blanks.
 _WIDE_GAP, _COLUMN_GAP = re.compile(" {3,}"), re.compile(r"\t|\s{2,}")
-#: Cell of a line whose columns are separated by wide gaps.
-_CELL = re.compile(r"\S+(?: \S+)*")
 
 
 @dataclass(frozen=True, kw_only=True)
