@@ -59,7 +59,7 @@ def inspect_file(
         MeasurementError, UnitError, CampaignError, FitError: a file or an option that cannot be used.
     """
     table, is_sweep = recognize_table(file, test_options)
-    place = tested_body(file, table, test_options)
+    place = tested_body(file, table, test_options) or of_book.direction
     read_as = place or Direction.AXIAL  # which of two translations it is makes no difference to reading
     entry = campaign_entry(table, place, test_options, is_sweep=is_sweep)
     by_name = labels_of_file(file, table.source.sheet or "", test_options)

@@ -217,6 +217,17 @@ def test_numbers_of_a_workbook_are_read_as_it_shows_them(header, form, factor, w
     check(test, LOOP)
 
 
+def test_the_direction_on_another_sheet_of_a_workbook(tmp_path):
+    book = openpyxl.Workbook()
+    for row in ["time [s]", "displacement [mm]", "force [N]"], *zip(TIME.tolist(), DISPLACEMENT, FORCE, strict=True):
+        book.active.append(row)
+    for row in (["Direction", "radial"], ["Temperature", "30 degC"]):
+        (book["Info"] if "Info" in book else book.create_sheet("Info")).append(row)
+    book.save(tmp_path / "loop.xlsx")
+    done = typing(tmp_path)("inspect", "loop.xlsx", "--json", "--no-plots")
+    assert 'direction = "radial"\nsheet = "Sheet"\ntemperature = "30 degC"' in json.loads(done.stdout)["campaign"]
+
+
 def test_hidden_rows_of_a_workbook_are_read_and_reported(tmp_path):
     book = openpyxl.Workbook()
     for row in ["time [s]", "displacement [mm]", "force [N]"], *zip(TIME.tolist(), DISPLACEMENT, FORCE, strict=True):
