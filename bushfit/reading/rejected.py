@@ -117,8 +117,8 @@ def _are_between_samples(rows: Sequence[FaultyRow]) -> bool:
     """True if each k-th row of the file is complete, because one of its channels was sampled more slowly."""
     lines = np.array([line for line, *_ in rows])
     complete = lines[1:][np.diff(lines) == 2]
-    are_alike = len({tuple(cell == "" for cell in cells) for _, cells, _ in rows}) == 1
-    return are_alike and complete.size > 2 and np.ptp(np.diff(complete)) == 0
+    empty = {tuple(cell == "" for cell in cells) for _, cells, _ in rows}
+    return len(empty) == 1 and any(*empty) and complete.size > 2 and np.ptp(np.diff(complete)) == 0
 
 
 def _broken_rows(table: Table, rows: Sequence[FaultyRow]) -> list[tuple[int, int]]:

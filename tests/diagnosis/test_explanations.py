@@ -36,7 +36,9 @@ def best(evidence: FitResult, every: Sequence[Explanation]) -> Explanation:
     rig = rig_errors(evidence, SHARED_RIG)
     solution = evidence
     precision = np.zeros(len(solution.jacobian))
-    worths = LinearModel(solution.residual, solution.jacobian, precision, rig).group_evidence([GroupSet(groups, rig)])
+    worths = LinearModel(solution.residual, solution.jacobian, precision, rig).group_evidence(
+        GroupSet.split(groups, rig)
+    )
     return max(zip(known, worths, strict=True), key=lambda pair: pair[1].log_evidence)[0]
 
 

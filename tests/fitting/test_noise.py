@@ -88,7 +88,7 @@ def test_no_repeats_fall_back_to_a_smooth_curve_and_an_assumption(noisy_sweep):
     np.testing.assert_allclose(scatter_of(found), 5e-3, rtol=0.1)
     assert {noise.shared for noise in found} == {ASSUMED}
     assert {noise.origin for noise in found} == {"assumed"}
-    assert "see [rig] in a campaign" in found[0].describe()
+    assert "unless [rig] states" in found[0].describe()
 
 
 def filtered(random: np.random.Generator, rows: int, correlation: float) -> np.ndarray:
