@@ -24,7 +24,9 @@ VALUES, ENTRIES, LINES = 4, 6, 200
 NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
 #: Keys, columns and texts that differ from run to run or from release to release.
 CHANGING = re.compile(r"seconds|key|inputs|version|sha256|provenance")
-CHANGING_TEXT = re.compile(r'bushfit \d+\.\d+\.\d+.*| time="[\d.]+"|; [\d.]+ s, [\d.]+ per second|\b[0-9a-f]{12,}\b')
+CHANGING_TEXT = re.compile(
+    r'bushfit \d+\.\d+\.\d+.*| time="[\d.]+"|; [\d.]+ s, [\d.]+ per second|\b(?=\d*[a-f])[0-9a-f]{12,}\b'
+)
 #: Relative tolerances of printed numbers, of data, and of data that are errors, derivatives or small differences.
 PRINTED, DATA, DERIVED = 0.02, 1e-3, 0.02
 DERIVATIVES = re.compile(
