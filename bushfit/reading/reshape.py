@@ -26,7 +26,10 @@ _LEVEL = re.compile(r"(?<![\w.,])\d+(?:[.,]\d+)?\s?(?:[^\W\d]{1,3}|%)(?![^\W_])"
 #: Names of a column with the values of several quantities, which another column names.
 _VALUES = frozenset(map(plain, WORDS["rows_of"]["values"]))
 #: Name, number and unit, if any, in a line of a log: "f=5.00 Hz".
-_PAIR = re.compile(r"([^\W\d][^\s=]*)\s?=\s?([+-]?\d(?:[\d.,eE+-]*\d)?(?:\s?[^\s\d=,;][^\s=,;]*(?![^\s,;]))?)")
+_PAIR = re.compile(
+    r"(?<![^\s,;(\[])([^\W\d][^\s=,;]{0,60})\s?=\s?"
+    r"([+-]?\d(?:[\d.,eE+-]*\d)?(?:\s?[^\s\d=,;][^\s=,;]*(?![^\s,;]))?)"
+)
 #: First rows that show whether a column names quantities; chosen: more than a test has channels.
 _FIRST_ROWS = 50
 
