@@ -107,10 +107,18 @@ def unpack(data: bytes, file: Path) -> bytes:
     """Return the content of a file that gzip packed; the bytes of any other file are unchanged.
 
     Raises:
-        MeasurementError: the packed file is damaged.
+        MeasurementError: the packed file is damaged, or its content is too large.
     """
+    if not data.startswith(b"\x1f\x8b"):
+        return data
     try:
-        return gzip.decompress(data) if data.startswith(b"\x1f\x8b") else data
+        with gzip.open(io.BytesIO(data)) as packed:
+            packed.seek(_LARGEST_BYTES)  # keeps nothing in memory
+            if packed.read(1):
+                found = f"more than {_LARGEST_BYTES} bytes when unpacked"
+                raise MeasurementError("the file is too large", file=file, found=found, hint="thin it out")
+            packed.seek(0)
+            return packed.read()
     except (OSError, EOFError, zlib.error) as error:
         raise MeasurementError("the file is damaged", file=file, found=str(error), hint="pack it again") from error
 

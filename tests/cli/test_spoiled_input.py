@@ -3,6 +3,7 @@ no more memory or time than a command may take."""
 
 import ast
 import errno
+import gzip
 import json
 import re
 import subprocess
@@ -166,6 +167,11 @@ def test_a_workbook_with_a_forgotten_cell_far_away(bombed):
     refused(
         bounded(bombed, "fit", "book.toml", "-o", "x"), bombed / "x", "book.xlsx: the workbook is too large", "save the"
     )
+
+
+def test_a_packed_file_whose_content_is_too_large(bombed):
+    (bombed / "zeros.csv.gz").write_bytes(17 * gzip.compress(bytes(1 << 26)))
+    refused(bounded(bombed, "inspect", "zeros.csv.gz", "-o", "x"), bombed / "x", "file is too large", "when unpacked")
 
 
 @pytest.fixture
