@@ -126,8 +126,6 @@ def list_folder(folder: Path, left_out: list[Caveat]) -> Iterator[TestSource]:
             why = "a broken link"
         elif printable(path.name) != path.name:
             why = "its name contains characters that are not text; rename it"
-        elif (path / "model.json").exists():
-            why = "results of bushfit"
         elif path.is_dir() and not os.access(path, os.R_OK | os.X_OK):
             why = "no permission to read this folder"
         elif path.is_dir() and (path / "model.json").is_file():
