@@ -70,12 +70,12 @@ def read_loop(
     if displacement @ force < displacement.sum() * force.sum() / force.size:  # a negative covariance
         sentence = f'"{wanted["force"].header}" falls where "{wanted["displacement"].header}" rises'
         if test.force_sign is not None:
-            problem, hint = (
+            raise table.error(
                 "the force falls where the displacement rises",
-                f"take force_sign = {test.force_sign} out of the campaign",
+                column=wanted["force"],
+                expected="force and displacement counted in the same direction",
+                hint=f"take force_sign = {test.force_sign} out of the campaign",
             )
-            expected = "force and displacement counted in the same direction"
-            raise table.error(problem, column=wanted["force"], expected=expected, hint=hint)
         values["force"] = force = -force
         notes += (Caveat("reversed_force", f"{sentence}: the force has the opposite sign and is turned"),)
     if "time" in values:
@@ -144,11 +144,14 @@ def time_column(table: Table, place: Place) -> Column:
     If its header has no unit, day numbers of a spreadsheet or a sampling rate above the table show the unit.
     """
     time = table.roles.get("time")
-    numbers = first_numbers(table, [time] if time else [])
-    if time and _TIMES.heading(time.header) is None and numbers.size > 2 and np.all(np.diff(numbers[:, 0]) == 1.0):
+    has_known_name = time is None or _TIMES.heading(time.header) is not None
+    if time is None or time.index in table.clocks or (has_known_name and time.unit):
+        return si_column(table, "time", place)
+    numbers = first_numbers(table, [time])
+    if not has_known_name and numbers.size > 2 and np.all(np.diff(numbers[:, 0]) == 1.0):
         hint = 'state sampling_rate = "100 Hz" in the campaign, or the rate of the record, in place of this column'
         raise table.error("this column counts the rows", column=time, expected="times", hint=hint)
-    if time is None or time.unit or time.index in table.clocks:
+    if time.unit:
         return si_column(table, "time", place)
     if np.min(numbers, initial=np.inf) > _SMALLEST_NANOSECONDS:
         return replace(time, scale=1e-9)
