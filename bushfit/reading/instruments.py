@@ -199,6 +199,9 @@ def _real_channels(channel: Channel, several: bool, is_record: bool) -> Iterator
         several: True if the file has several complex channels; a phase is then named after its channel.
         is_record: True if the channels are recorded over time, so that complex values have no meaning.
 
+    Yields:
+        The channel with floats, seconds or texts; for complex values, its magnitude and then its phase [rad].
+
     Raises:
         MeasurementError: a record, a time, a frequency or an amplitude is complex.
     """

@@ -319,9 +319,8 @@ def _descriptions(below: Sequence[Line], delimiter: str, width: int) -> list[Lin
         return split(line.content, delimiter)
 
     def is_counted(line: Line) -> bool:
-        return width > 2 and [f"{plainest_value(cell):g}" for cell in cells(line)] == list(
-            map(str, range(1, width + 1))
-        )
+        numbers = [plainest_value(cell) for cell in cells(line)]
+        return width > 2 and numbers == list(range(1, width + 1))
 
     named = [*takewhile(lambda line: (first := cells(line)[0]) != "" and not is_like_number(first), below)]
     if any(plain(cells(line)[0]) in _DESCRIPTIONS for line in named):

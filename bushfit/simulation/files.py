@@ -21,6 +21,7 @@ from bushfit.reading.resonance import ResonanceTest
 from bushfit.reading.tablefile import Form, ending, to_bytes
 from bushfit.simulation.measured import Simulated
 from bushfit.templates import render_template
+from bushfit.units import CELSIUS
 
 
 class SimulationDocument(TypedDict):
@@ -67,6 +68,7 @@ def to_files(simulated: Simulated, form: Form = "csv", effects: Collection[str] 
         quoted=lambda text: quote_path(Path(str(text))),
         specimen_lines=specimen_lines,
         toml_value=toml_value,
+        celsius=CELSIUS,
     )
     return {
         **{f"{name}.{ending(form)}": to_bytes(name, table, form) for name, table in tables.items()},
