@@ -155,7 +155,7 @@ def _require_free_parameter(data: PreparedCampaign, model: Model | None, setting
         settings: settings of the diagnosis, with the effects to add.
     """
     model = model or Model.with_defaults(data.campaign.bushing, data.effects, {})
-    if not (settings.adopt or data.free(tuple(model.parameters))):
+    if not (settings.adopt or data.free_names(tuple(model.parameters))):
         raise FitError(
             "there is nothing to fit, and so nothing to diagnose",
             file=data.campaign.path,

@@ -116,7 +116,7 @@ def fit_dynamic(
         FitError: no result, no values in the campaign, and no loops.
     """
     data, steps = prepare_tests(campaign, loss), []
-    fixed = as_result(static) if static else procedures.given_static(data)
+    fixed = as_result(static) if static else procedures.fixed_static_result(data)
     if fixed is None:
         if not data.loops:
             raise FitError(

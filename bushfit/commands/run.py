@@ -105,7 +105,7 @@ def run(campaign: Campaign | PreparedCampaign, *, loss: Loss | None = None) -> R
     two_step, reason = None, ""
     if not (data.loops and data.sweeps):
         reason = f"no {'sweeps' if data.loops else 'loops'}"
-    elif not data.free(FIVE):
+    elif not data.free_names(FIVE):
         reason = "every parameter is fixed"
     else:
         try:

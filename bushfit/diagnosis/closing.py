@@ -159,7 +159,7 @@ def _hold_out_inside(before: FitResult, closest: FitResult, correction: Unnamed)
             rows = HoldOutPart.of_tests(name, by_sweep, fit.data_sets).rows(fit.data_sets)
             rows = np.pad(rows, (0, leave_out.residual.size - rows.size))
             if not leave_out.undetermined(rows)[:count].any():  # else the rest does not determine the parameters
-                pairs.append(leave_out.predicted(rows))
+                pairs.append(leave_out.predicted_residual(rows))
         if len(pairs) == len(models):
             residuals[name] = np.array(pairs)
     return HoldOut.from_residuals(residuals)

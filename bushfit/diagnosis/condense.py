@@ -12,7 +12,7 @@ import numpy as np
 from bushfit.campaign.schema import RigSettings
 from bushfit.caveat import Caveat
 from bushfit.effects.contract import Array, RubberConditions
-from bushfit.fitting.noise import LineKey, SweepNoise, sweep_noise
+from bushfit.fitting.noise import LevelKey, SweepNoise, sweep_noise
 from bushfit.fitting.preparation import MeasuredLoop, MeasuredSweep, repeats_of, with_gain_errors
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.gaussian_process import spread_nodes
@@ -41,7 +41,7 @@ class _ShortSweep(NamedTuple):
 
     sweep: Sweep
     conditions: RubberConditions
-    noise_ratios: Mapping[LineKey, float]
+    noise_ratios: Mapping[LevelKey, float]
     sentence: str
 
 
@@ -120,8 +120,8 @@ def _new_noise(before: SweepNoise, shortened: Sequence[_ShortSweep], rig: RigSet
         for key, ratio in short.noise_ratios.items():
             gain, phase = np.sqrt(ratio) * np.array(before.random[key])
             random[key] = estimated.random[key] if short.sweep.noise is None else (float(gain), float(phase))
-    freedom = min(before.scatter_freedom, estimated.scatter_freedom)
-    return replace(before, random=random, slopes={**slopes, **estimated.slopes}, scatter_freedom=freedom)
+    freedom = min(before.random_freedom, estimated.random_freedom)
+    return replace(before, random=random, slopes={**slopes, **estimated.slopes}, random_freedom=freedom)
 
 
 def _shorten_sweep(data_set: MeasuredSweep) -> _ShortSweep | None:

@@ -218,7 +218,7 @@ def _predict(fit: FitResult, leave_out: LeaveOut, part: HoldOutPart, bounds: Bou
     if undetermined := [names[fit.inner_indices[i]] for i in np.flatnonzero(leave_out.undetermined(rows))]:
         reason = f"the other tests do not determine {', '.join(undetermined)}"
         return Skipped(part.name, reason, tuple(dict.fromkeys(map(effect_name_of, undetermined))))
-    is_step = leave_out.step(rows) is not None
+    is_step = leave_out.parameter_step(rows) is not None
     if not is_step:
         failed = Skipped(part.name, "no fit to the other tests converges")
         try:
@@ -228,7 +228,7 @@ def _predict(fit: FitResult, leave_out: LeaveOut, part: HoldOutPart, bounds: Bou
         leave_out = _leave_out(rest.reevaluate(rest.model, data_sets))
         if rest.stopped or leave_out.undetermined(rows).any():
             return failed
-    residuals = leave_out.predicted(rows, stepped=is_step)
+    residuals = leave_out.predicted_residual(rows, stepped=is_step)
     return residuals, leave_out.noise_gradient(rows, residuals)[: of_tests.size]
 
 

@@ -35,7 +35,7 @@ def laplace(name: str, fit: FitResult, before: FitResult) -> tuple[float, dict[s
     effect, names = get_effect(name), fit.names
     data_sets, model = fit.data_sets, fit.model
     reference = model.without(name) if effect.replaces is None else before.model
-    size = max(data_set.change(model, reference) for data_set in data_sets)
+    size = max(data_set.largest_difference(model, reference) for data_set in data_sets)
     density, precision, count = 0.0, {}, 0
     variances = np.diag(np.linalg.pinv(fit.jacobian @ fit.jacobian.T, rcond=1e-12, hermitian=True))
     if effect.replaces is not None:

@@ -189,7 +189,7 @@ def noise_cases(fit: FitResult) -> list[NoiseCase]:
         Noise cases, whose prior probabilities sum to one.
     """
     sweeps = split_by_kind(fit.data_sets)[1]
-    freedom = max((sweep.noise.scatter_freedom for sweep in sweeps), default=0)
+    freedom = max((sweep.noise.random_freedom for sweep in sweeps), default=0)
     thirds = (np.arange(3) + 0.5) / 3
     scatters = np.sqrt(freedom / chdtri(freedom, 1.0 - thirds)).tolist() if 0 < freedom < _KNOWN else [1.0]
     runs, waves = (RUNS, WANDERING) if sweeps else (((0.0, 1.0),),) * 2

@@ -25,7 +25,7 @@ from bushfit.fitting.descent import Descent
 from bushfit.fitting.preparation import split_by_kind, with_gain_weighting
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.problem import FitProblem, FitResult
-from bushfit.fitting.robust import estimate, list_outliers, outlier_warnings
+from bushfit.fitting.robust import list_outliers, outlier_warnings, solve_problem
 from bushfit.geometry import get_places
 from bushfit.model.model import Model
 from bushfit.model.result import Outlier
@@ -134,7 +134,7 @@ def _initial_fit(
     model = model.with_values({name: value for name, value in stated_values if effect_name_of(name) in settings.adopt})
     outliers: tuple[Outlier, ...] = ()
     if data.robust:
-        robust = estimate(FitProblem.with_fixed(model, data_sets, fixed, data.bounds), robust=True)
+        robust = solve_problem(FitProblem.with_fixed(model, data_sets, fixed, data.bounds), robust=True)
         outliers, data_sets = robust.outliers, robust.data_sets
     data_sets = [data_set.with_weight() for data_set in with_gain_weighting(data_sets, weigh=True)]
     descent = Descent.start(FitProblem.with_fixed(model, data_sets, fixed, data.bounds)).run(EVALUATIONS)

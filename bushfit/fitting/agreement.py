@@ -69,35 +69,35 @@ class LeaveOut:
         return cls(basis, directions[determined].T / size[determined], basis.T @ residual, residual)
 
     def undetermined(self, rows: Array) -> Array:
-        """Mask of the parameters, (k,), that a fit without the given rows (indices or mask) would not determine."""
+        """Mask of the parameters, (k,), whose variance grows 100-fold if `rows` (indices or mask) are left out."""
         size, vectors = np.linalg.eigh(self._information(rows))
         without = np.square(self.coordinate_steps @ vectors) @ (1.0 / np.maximum(size, _LEAST_SEEN**2))
         return without > _MOST_GROWTH * np.sum(np.square(self.coordinate_steps), axis=1)
 
-    def step(self, rows: Array) -> Array | None:
+    def parameter_step(self, rows: Array) -> Array | None:
         """Change of the k fitted parameters in their coordinates, (k,), if `rows` (indices or mask) are left out.
 
-        None if the Gauss-Newton step is too long to predict a refit, or if the remaining rows do not determine a
-        parameter.
+        None if a coordinate (mostly ln value) would change by more than 0.3, too far to predict a refit, or if the
+        remaining rows do not determine a parameter.
         """
         if self.undetermined(rows).any():
             return None
         change = self.coordinate_steps @ self._basis_step(rows)
         return None if np.abs(change).max(initial=0.0) > _LONGEST_STEP else change
 
-    def predicted(self, rows: Array, *, stepped: bool = True) -> Array:
+    def predicted_residual(self, rows: Array, *, stepped: bool = True) -> Array:
         """Residuals of held-out rows in units of noise, (h,), predicted by the fit to the other rows.
 
         Args:
             rows: mask of the h held-out rows among all n rows, (n,); the other rows must determine all parameters.
-            stepped: False if the fit already excludes the held-out rows.
+            stepped: True to apply the parameter step of leaving the rows out; False for the residuals of the fit.
         """
         return self.residual[rows] + self.basis[rows] @ self._basis_step(rows) * stepped
 
     def noise_gradient(self, rows: Array, predicted: Array) -> Array:
-        """Derivatives of half the sum of squared predicted residuals with respect to the noise of each row.
+        """Derivatives of half the sum of squared predicted residuals with respect to the error of each row.
 
-        The noise acts directly on held-out rows, and on the others through the parameters that they determine.
+        The error of a held-out row acts directly; that of any other row acts through the parameters.
 
         Args:
             rows: mask of the h held-out rows among all n rows, (n,).
@@ -121,7 +121,7 @@ class LeaveOut:
 
 
 def misfits(model: Model, fitted: Sequence[MeasuredTest], unfitted: Sequence[MeasuredTest] = ()) -> tuple[Misfit, ...]:
-    """Misfit of a model to each test, and to each run (frequency or amplitude sweep) of tests with several runs.
+    """Misfits (NRMSE, reduced chi-square, mean gain error) of a model in each test and in each run of a sweep.
 
     Args:
         model: fitted model.
@@ -134,7 +134,7 @@ def misfits(model: Model, fitted: Sequence[MeasuredTest], unfitted: Sequence[Mea
     found = []
     for index, whole in enumerate([*fitted, *unfitted]):
         test = whole.with_weight()
-        relative, gain = test.relative(model), 1.0 - np.abs(test.noise_free(model).measured / test.measured)
+        relative, gain = test.relative_distance(model), 1.0 - np.abs(test.noise_free(model).measured / test.measured)
         squares = np.square(test.residual(model)).reshape(test.residuals_per_point, -1).sum(axis=0)
         runs = list(_runs(test))
         for label, points in ((_NO_RUN, slice(None)), *(runs if len(runs) > 1 else ())):
@@ -186,7 +186,7 @@ def expected_errors(
         slopes = (log_slopes(model, test, fit.names) * per_coordinate)[fit.inner_indices]
         for _, points in _runs(test):
             residuals = np.broadcast_to(points, (test.residuals_per_point, test.size // test.residuals_per_point))
-            step = whole.step(rows.start + np.flatnonzero(residuals))
+            step = whole.parameter_step(rows.start + np.flatnonzero(residuals))
             predicted = modelled if step is None else modelled * np.exp(step @ slopes)
             counted = points & (test.weights > 0.0 if isinstance(test, MeasuredSweep) else True)
             difference = _absolute_difference(predicted[counted], test.measured[counted])
@@ -198,7 +198,7 @@ def expected_errors(
 
 
 def prior_uses(solution: FitResult, covariance: Covariance) -> dict[str, PriorUse]:
-    """Compare each prior of a fit with the tests: its share in the estimate, and its distance from what the tests show.
+    """Share of each prior in a fit's estimate, and its distance from the tests' estimate in standard deviations.
 
     Args:
         solution: result of the fit.
@@ -242,7 +242,7 @@ def prior_uses(solution: FitResult, covariance: Covariance) -> dict[str, PriorUs
 
 
 def prior_warnings(uses: Mapping[str, PriorUse]) -> list[Caveat]:
-    """Return a warning for each prior that the tests contradict."""
+    """Return a warning for each prior that the tests contradict at a significance level of 5 %."""
     return [
         Caveat(
             "prior_contradicted",

@@ -56,7 +56,7 @@ def covariance(
         stages: fits of the procedure, in order, such as the static and the dynamic fit of the paper: their free
             parameters, and their tests with the weights of the fit.
         fixed: covariance of parameters that all stages kept fixed; None if these are exact.
-        smooth_error: error of a model that misses its tests by more than their noise; None for a model that fits.
+        smooth_error: smooth error of a model that misses its tests by more than their noise; None if the model fits.
 
     Returns:
         Covariance of the parameter values in SI units. If the residuals of a stage, or of one of its tests, exceed the
@@ -155,7 +155,7 @@ def _changes_by_noise(
 
 
 def _inverse(system: Array) -> Array:
-    """Inverse of a square matrix, (k, k), that may be singular: its singular values are at most `_LARGEST_ERROR`."""
+    """Inverse of a square matrix, (k, k), that may be singular; singular values of the inverse are at most 1000."""
     left_vectors, values, right_vectors = np.linalg.svd(system)
     return (right_vectors.T / np.maximum(values, 1.0 / _LARGEST_ERROR)) @ left_vectors.T
 
@@ -179,8 +179,8 @@ def reduced_chi_square(model: Model, data_sets: Sequence[MeasuredTest], paramete
         data_sets: tests.
         parameters: number of fitted parameters.
 
-    Yields:
-        One warning with the reduced chi-square, and the test that is missed most; none for a model that fits.
+    Returns:
+        Reduced chi-square, and its degrees of freedom: residuals with weight minus parameters, at least 1.
     """
     chi_square, freedom = 0.0, -parameters
     for test in data_sets:
@@ -191,7 +191,7 @@ def reduced_chi_square(model: Model, data_sets: Sequence[MeasuredTest], paramete
 
 
 def lack_of_fit(model: Model, data_sets: Sequence[MeasuredTest], parameters: int) -> float | None:
-    """Reduced chi-square if the model misses the tests by more than their noise; else None.
+    """Reduced chi-square if it exceeds 1 by more than 5 of its standard deviations (a lack of fit); else None.
 
     Args:
         model: fitted model.
@@ -242,7 +242,7 @@ def quality(model: Model, data_sets: Sequence[MeasuredTest], parameters: int) ->
     """
     squares, counts = list[Array](), [test.residual_count for test in data_sets]
     for test in data_sets:
-        squares.append(np.square(test.relative(model)))
+        squares.append(np.square(test.relative_distance(model)))
     loops, _ = split_by_kind(data_sets)
     repeats = np.count_nonzero(repeats_of(loops), axis=1)
     return Quality(
@@ -255,7 +255,7 @@ def quality(model: Model, data_sets: Sequence[MeasuredTest], parameters: int) ->
 
 
 def measured_range(model: Model, data_sets: Sequence[MeasuredTest]) -> Range:
-    """Determine the ranges of the operating conditions of tests.
+    """Ranges of the frequencies, strains, temperatures and preloads of tests, and the tested directions.
 
     Returns:
         Ranges of frequency [Hz], equivalent strain amplitude [1], temperature [K] and preload, and tested directions.
@@ -305,7 +305,7 @@ def implausible_modulus(bushing: Bushing | None, data_sets: Sequence[MeasuredTes
 
 
 def check_strain(bushing: Bushing | None, data_sets: Sequence[MeasuredTest]) -> None:
-    """Raise a FitError if the strain of a test is beyond any rubber, usually because of a wrong unit or dimension."""
+    """Raise a FitError if a test's strain amplitude exceeds 300 %, usually because of a wrong unit or dimension."""
     for data_set in data_sets:
         largest = float(np.max(data_set.amplitude))
         if (strain := largest * unit_strain(bushing, data_set.direction)) > _MOST_STRAIN:
@@ -320,7 +320,7 @@ def check_strain(bushing: Bushing | None, data_sets: Sequence[MeasuredTest]) -> 
 
 
 def temperature_warning(model: Model, data_sets: Sequence[MeasuredTest]) -> list[Caveat]:
-    """Warning about tests whose temperatures are too different for one model.
+    """Warning about tests whose temperatures differ by more than 3 K, if the model has no effect of temperature.
 
     Returns:
         At most one warning.
@@ -341,7 +341,7 @@ def temperature_warning(model: Model, data_sets: Sequence[MeasuredTest]) -> list
 
 
 def mixed_condition_warnings(data_sets: Sequence[MeasuredTest]) -> Iterator[Caveat]:
-    """Yield warnings on tests of one bushing that one model does not describe.
+    """Yield warnings on tests of different specimens or preloads, which one model does not describe.
 
     Args:
         data_sets: fitted tests.
@@ -377,7 +377,7 @@ def unfitted_warnings(model: Model, data_sets: Sequence[MeasuredTest]) -> Iterat
     misses = dict[str, list[tuple[float, float, str]]]()
     for test in data_sets:
         if (chi_square := lack_of_fit(model, [test], 0)) is not None:
-            share = 100.0 * float(np.sqrt(np.mean(np.square(test.relative(model)))))
+            share = 100.0 * float(np.sqrt(np.mean(np.square(test.relative_distance(model)))))
             misses.setdefault(str(test.direction), []).append((float(np.sqrt(chi_square)), share, test.name))
     for place, found in misses.items():
         noises, share, worst = max(found)

@@ -64,7 +64,7 @@ class Coordinates:
 
 
 def relative_sizes(model: Model, names: Sequence[str]) -> Array:
-    """Derivatives of k parameter coordinates with respect to relative changes dp/p, (k,): 1 for a coordinate ln p."""
+    """Derivatives of k parameter coordinates with respect to dp/p, (k,): 1 for ln p, |p|/typical (>= 0.05) else."""
     pairs = [(model.parameters[name], abs(model.values[name])) for name in names]
     return np.array(
         [1.0 if parameter.log else max(value / parameter.typical, _LEAST_SIZE) for parameter, value in pairs]

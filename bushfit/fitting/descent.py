@@ -133,13 +133,13 @@ class Descent:
             step, expected = fit._step(damping)
             smallest_fall = _LEAST_FALL if fit.tolerance is None else fit.tolerance * fit.chi_square
             converged = 0.0 <= expected < smallest_fall
-            bend = fit._bend(step, damping)
+            bend = fit._curvature_correction(step, damping)
             # so far out between the bounds, or on a way that bends so much, that only caution leads down
             while expected < 0.0 or fit._length(bend) > _MOST_BENT * fit._length(step):
                 damping *= 2.0
                 step, expected = fit._step(damping)
-                bend = fit._bend(step, damping)
-            point = np.clip(fit.point + step + bend, *fit._reach)
+                bend = fit._curvature_correction(step, damping)
+            point = np.clip(fit.point + step + bend, *fit._step_limits)
             has_failed, after_failure = fit.growth > _FIRST_GROWTH, (damping * fit.growth, 2.0 * fit.growth)
             state = fit.evaluations + 1, converged, *after_failure
             fit = Descent(fit.best, fit.point, fit.tolerance, *state, fit.last)
@@ -173,13 +173,13 @@ class Descent:
         return fit
 
     @cached_property
-    def _normal(self) -> tuple[Array, Array]:
-        """Gauss-Newton Hessian, (k, k), and gradient, (k,), of chi-square/2 in the k parameter coordinates."""
+    def _hessian_and_gradient(self) -> tuple[Array, Array]:
+        """Gauss-Newton Hessian, (k, k), and gradient, (k,), of chi-square/2 over the k parameter coordinates."""
         return self.best.jacobian @ self.best.jacobian.T, self.best.jacobian @ self.best.residual
 
     @cached_property
-    def _reach(self) -> tuple[Array, Array]:
-        """Smallest and largest coordinates after the next step, by the bounds and the limit of a step, (k,) each."""
+    def _step_limits(self) -> tuple[Array, Array]:
+        """Smallest and largest coordinates that the next step may reach, (k,) each."""
         parameters, (low, high) = self.best.coordinates.parameters, self.best.problem.limits
         longest = np.array([_LONGEST_STEP if parameter.log else np.inf for parameter in parameters])
         return np.maximum(low, self.point - longest), np.minimum(high, self.point + longest)
@@ -197,9 +197,9 @@ class Descent:
         Returns:
             Step of the k parameter coordinates, (k,), and the expected fall.
         """
-        curvature, slope = self._normal
+        curvature, slope = self._hessian_and_gradient
         size = np.diag(curvature)
-        low, high = self._reach
+        low, high = self._step_limits
         damped = curvature + np.diag(damping * size)
         lowest, highest = self.best.problem.limits
         outward = ((self.point <= lowest) & (slope >= 0.0)) | ((self.point >= highest) & (slope <= 0.0))
@@ -214,8 +214,8 @@ class Descent:
             free &= ~outside
         return step, float(-(2.0 * slope + curvature @ step) @ step)
 
-    def _bend(self, step: Array, damping: float) -> Array:
-        """Second-order correction of a damped step, which bends along a curved valley of chi-square.
+    def _curvature_correction(self, step: Array, damping: float) -> Array:
+        """Correction of a damped step for the curvature of the residuals (geodesic acceleration), (k,).
 
         The second derivative is known along the last successful step. If that step had another direction, the
         correction is 0.
@@ -230,7 +230,7 @@ class Descent:
         if self.last is None:
             return np.zeros_like(step)
         before, second = self.last
-        curvature, _ = self._normal
+        curvature, _ = self._hessian_and_gradient
         size = np.diag(curvature)
         lengths = self._length(step), self._length(before)
         if step @ (size * before) <= _SAME_WAY * lengths[0] * lengths[1]:
@@ -241,8 +241,8 @@ class Descent:
         return bend
 
     def _length(self, step: Array) -> float:
-        """Length of a step, (k,): root of the sum of squared residual changes that each parameter alone would cause."""
-        return float(np.sqrt(np.diag(self._normal[0]) @ np.square(step)))
+        """Length of a step, (k,): root sum square of the changes of all residuals by each parameter alone."""
+        return float(np.sqrt(np.diag(self._hessian_and_gradient[0]) @ np.square(step)))
 
 
 def _solve(curvature: Array, pull: Array, free: Array) -> Array:

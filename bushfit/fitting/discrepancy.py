@@ -115,7 +115,7 @@ class FittedTests:
         """Convert relative changes of the stiffness into changes of the whitened residuals.
 
         Args:
-            shapes: c relative changes of the stiffness at the operating points, complex (c, p).
+            shapes: c patterns of relative change of the stiffness at the operating points, complex (c, p).
             reduced: True for the changes of the d components of `project`, False for those of all n residuals.
 
         Returns:
@@ -133,15 +133,17 @@ class FittedTests:
 
     @cached_property
     def _stiffness(self) -> Array:
+        """Stiffness of the fitted model at the operating points, complex (p,) [N/m or N m/rad]."""
         return np.concatenate([data_set.noise_free(self.solution.model).measured for data_set in self.data_sets])
 
     @cached_property
-    def remainder(self) -> tuple[Array, Array]:
-        """Part of the residuals that the parameters do not explain.
+    def split_by_parameters(self) -> tuple[Array, Array]:
+        """Changes of the residuals that the fitted parameters can cause, and the residuals that remain without them.
 
         Returns:
-            Orthonormal basis of the changes of the residuals by the parameters, reduced to the d components of
-            `project`, (e, d); and components of the residuals orthogonal to this basis, (d,).
+            Basis of the changes that e independent combinations of the parameters cause, orthonormal over all n
+            residuals, given in the d components of `project`, (e, d); and the components of the residuals after their
+            part along this basis is subtracted, (d,).
         """
         rows, residual = self.solution.jacobian, self.solution.residual
         information = rows @ rows.T
@@ -162,7 +164,8 @@ class Discrepancy:
         groups: groups of directions or specimens; the members of a group share one error.
         lengths: correlation lengths in ln frequency and ln strain.
         nodes: for each group, indices of the m operating points that represent the process (its nodes), (m,).
-        shapes: relative error at the operating points in each of q independent patterns of the process, (q, p).
+        shapes: relative error at the operating points in each of q independent patterns whose squares sum to the
+            variance of the process of size 1, (q, p).
         sizes: candidate standard deviations of the process, relative to |K|, ascending, (s,).
     """
 
@@ -214,12 +217,12 @@ class Discrepancy:
     @cached_property
     def likelihood(self) -> RestrictedLikelihood:
         """Restricted likelihood of the standard deviation of the model's error, relative to |K|, given the tests."""
-        span, remainder = self.tests.remainder
+        span, remainder = self.tests.split_by_parameters
         return RestrictedLikelihood.from_columns(self.columns, remainder, span)
 
     @cached_property
-    def best(self) -> tuple[float, float]:
-        """Largest increase of the log likelihood by an error of the model, and this error's size relative to |K|."""
+    def maximum(self) -> tuple[float, float]:
+        """Largest increase of the log likelihood by an error of the model, over `sizes`, and the size that gives it."""
         gains = self.likelihood.gains(self.sizes)
         return float(gains.max()), float(self.sizes[gains.argmax()])
 
@@ -230,7 +233,7 @@ class Discrepancy:
             Mean relative error of the model at the operating points, complex (p,), and the standard deviation of its
             real and imaginary parts, errors of the parameters included, (2, p).
         """
-        size, columns, rows = self.best[1], self.columns, self.tests.free_jacobian
+        size, columns, rows = self.maximum[1], self.columns, self.tests.free_jacobian
         inverse = np.linalg.inv(columns @ columns.T + np.eye(len(columns)) / size**2)
         mean = (-inverse @ columns @ self.tests.project(self.tests.solution.residual)) @ self.complex_shapes
         both = np.concatenate((columns, self.tests.project(rows)))
@@ -244,22 +247,22 @@ class Discrepancy:
         return mean, np.array([np.linalg.norm(whole.real, axis=0), np.linalg.norm(whole.imag, axis=0)])
 
 
-def averaged(processes: Sequence[Discrepancy]) -> Unnamed:
-    """Average several Gaussian processes of a model's error, weighted by likelihood, into one correction of the model.
+def average_processes(processes: Sequence[Discrepancy]) -> Unnamed:
+    """Average Gaussian processes of a model's error, weighted by likelihood, into one correction of the stiffness.
 
-    Only processes with the groups of the likeliest are averaged: in one group, two directions cannot have different
-    errors at the same strain. Lengths are geometric means. Few degrees of freedom determine the size, so standard
-    deviations are enlarged until a normal 95 % interval is as wide as that of Student's t.
+    Only processes that group directions as the likeliest process does are averaged, because the members of a group
+    share one error. Lengths are geometric means. Few degrees of freedom determine the size, so standard deviations are
+    enlarged until a normal 95 % interval is as wide as that of Student's t.
 
     Returns:
         Correction at the nodes, with its standard deviation, both relative to the stiffness.
     """
-    best = max(processes, key=lambda process: process.best[0])
-    lower_limit = best.best[0] + np.log(_COUNTS)
-    processes = [process for process in processes if process.groups == best.groups and process.best[0] > lower_limit]
-    share = np.exp([process.best[0] - best.best[0] for process in processes])
+    best = max(processes, key=lambda process: process.maximum[0])
+    lower_limit = best.maximum[0] + np.log(_COUNTS)
+    processes = [process for process in processes if process.groups == best.groups and process.maximum[0] > lower_limit]
+    share = np.exp([process.maximum[0] - best.maximum[0] for process in processes])
     share /= share.sum()
-    freedom = float(share @ [process.likelihood.freedom(process.best[1]) for process in processes])
+    freedom = float(share @ [process.likelihood.freedom(process.maximum[1]) for process in processes])
     wider = float(stdtrit(max(freedom, _MINIMUM_FREEDOM), 0.975)) / Z95
     conditioned = list[tuple[Array, Array]]()
     for process in processes:
@@ -269,7 +272,7 @@ def averaged(processes: Sequence[Discrepancy]) -> Unnamed:
     deviations = np.array([[np.square((one - mean).real), np.square((one - mean).imag)] for one in means])
     error = wider * np.sqrt(np.tensordot(share, np.square(errors) + deviations, 1))
     lengths = np.exp(share @ np.log([process.lengths for process in processes]))
-    size = wider * float(np.exp(share @ np.log([process.best[1] for process in processes])))
+    size = wider * float(np.exp(share @ np.log([process.maximum[1] for process in processes])))
     patches = []
     for group, nodes in zip(best.groups, best.nodes, strict=True):
         lists = (mean[nodes].real, mean[nodes].imag, *error[:, nodes])
@@ -278,8 +281,8 @@ def averaged(processes: Sequence[Discrepancy]) -> Unnamed:
     return Unnamed(size, (float(lengths[0]), float(lengths[1])), tuple(patches))
 
 
-def discrepancies(tests: FittedTests) -> list[Discrepancy]:
-    """List the Gaussian processes that may describe the misfit of a model, to be compared by their likelihood.
+def candidate_processes(tests: FittedTests) -> list[Discrepancy]:
+    """Build the 12 or 24 Gaussian processes that may describe a model's misfit, to be compared by likelihood.
 
     For each pair of correlation lengths, in ln frequency and in ln strain, the list has two processes: one error for
     all directions, and independent errors of the directions.

@@ -151,9 +151,9 @@ def _percent(error: float) -> str:
 def _open_groups(names: Sequence[str], slopes: Array) -> tuple[dict[str, Array], list[list[str]]]:
     """Independent errors of the parameters, and groups of the parameters that the tests do not determine.
 
-    The independent errors are the eigenvectors of the covariance, times the standard error of each. An open direction
-    is one with a large standard error. The parameters of one open direction, and of all open directions that have a
-    parameter in common with it, form a group.
+    The independent errors are the eigenvectors of the covariance, times the standard error of each. Those above 15 %
+    are open. The parameters of one open error, and of all open errors that have a parameter in common with it, form a
+    group.
 
     Args:
         names: names of the k parameters.

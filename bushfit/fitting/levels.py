@@ -25,7 +25,8 @@ class LevelErrors(NamedTuple):
     Args:
         error: standard deviation of the relative gain error, and of the phase error [rad].
         freedom: degrees of freedom behind the error; 0 if the error is fixed at the largest that a rig may have.
-        significant: True if including these errors lowers -2 ln(likelihood) by more than chance explains.
+        significant: True if including these errors lowers -2 ln(likelihood) by more than 6, or by more than 0.5 if no
+            run was repeated.
     """
 
     error: tuple[float, float]
@@ -36,12 +37,12 @@ class LevelErrors(NamedTuple):
 def level_errors(
     data_sets: Sequence[MeasuredTest], residual: Array, absorbed: Array, maximum: tuple[float, float]
 ) -> LevelErrors:
-    """Estimate gain and phase errors that all runs at one amplitude or frequency share (a level).
+    """Estimate gain and phase errors that all runs of a level (one constant amplitude or frequency) share.
 
     Args:
         data_sets: fitted tests.
         residual: whitened residuals at the end of the fit, with the rows of priors, (n,).
-        absorbed: changes of the whitened residuals that fitted parameters or faults can produce, (k, n).
+        absorbed: changes of the whitened residuals that parameters or faults of the record can cause, (k, n).
         maximum: largest standard deviation of gain and of phase [rad] that the rig may have.
 
     Returns:
@@ -76,10 +77,10 @@ def level_errors(
     added, most_added = np.zeros(2), np.maximum(np.square(maximum) - counted, 0.0)
 
     def likelihood(added: Array) -> tuple[Array, Array, float]:
-        """Restricted likelihood of the residuals if all runs of a level share additional gain and phase errors.
+        """Derivatives and value of the restricted log likelihood for given errors of the levels.
 
         Args:
-            added: additional variance of the gain, and of the phase, (2,).
+            added: variance of the gain and of the phase [rad^2] to add to that of the levels, (2,).
 
         Returns:
             Gradient, (2,), and Fisher information, (2, 2), of ln(likelihood), and the value of -2 ln(likelihood).

@@ -41,7 +41,7 @@ _OUTER = 0.9
 
 
 def steady_cycles(loop: Loop) -> tuple[Loop, float, float, str | None]:
-    """Find the steady cycles of a loop; if rows are missing, in its longest part without a gap.
+    """Cut a loop to its steady cycles; if rows are missing, to those of its longest part without a gap.
 
     Returns:
         The loop without the rows before and after its steady cycles, the frequency of its motion [Hz], the number of
@@ -54,7 +54,7 @@ def steady_cycles(loop: Loop) -> tuple[Loop, float, float, str | None]:
     part, note = _steady_part(loop, time, motion)
     if part is not loop:
         time, motion = _thin_rows(part)
-    frequency, cycles = _fundamental(part, time, motion)
+    frequency, cycles = _frequency_and_cycles(part, time, motion)
     widest = int(np.argmax(np.diff(time)))
     if time[widest + 1] - time[widest] > HOLE / frequency:
         raise FitError(
@@ -101,7 +101,7 @@ def _steady_part(loop: Loop, time: Array, motion: Array) -> tuple[Loop, str | No
     if holes.size:
         starts, ends = time[np.append(0, holes + 1)], time[np.append(holes, time.size - 1)]
         first, last = max(zip(starts, ends, strict=True), key=lambda part: part[1] - part[0])
-        whole = _cut(loop, first, last)
+        whole = _select_interval(loop, first, last)
         part, note = _steady_part(whole, *_thin_rows(whole))
         sentence = f"rows are missing; of {time[-1] - time[0]:.3g} s only {first:.4g} to {last:.4g} s are used"
         return part, sentence if note is None else f"{sentence}; in this part, {note}"
@@ -117,10 +117,10 @@ def _steady_part(loop: Loop, time: Array, motion: Array) -> tuple[Loop, str | No
         return loop, None
     equal_cycles = sum(equal.cycles for equal in spans if equal is not span)
     note = omitted_rows_sentence(gaps, (last - first) / span.period, equal_cycles)
-    return _cut(loop, first, last if gaps[1] else np.inf), note
+    return _select_interval(loop, first, last if gaps[1] else np.inf), note
 
 
-def _cut(loop: Loop, first: float, last: float) -> Loop:
+def _select_interval(loop: Loop, first: float, last: float) -> Loop:
     """Keep only the rows of a loop from the time `first` [s] to the time `last` [s]."""
     return loop.select(slice(np.searchsorted(loop.time, first), np.searchsorted(loop.time, last, side="right")))
 
@@ -141,7 +141,7 @@ def _period(time: Array, motion: Array) -> float | None:
     return float(np.median(intervals[intervals.size // 2 :])) if intervals.size else None
 
 
-def _fundamental(loop: Loop, clock: Array, displacement: Array) -> tuple[float, float]:
+def _frequency_and_cycles(loop: Loop, clock: Array, displacement: Array) -> tuple[float, float]:
     """Frequency [Hz] and number of cycles of a loop that consists of steady cycles.
 
     Args:
@@ -161,10 +161,10 @@ def _fundamental(loop: Loop, clock: Array, displacement: Array) -> tuple[float, 
         counted = (same_sense.size - 1) / float(same_sense[-1] - same_sense[0])
         frequency = _refine_frequency(clock, x, counted, rows / (closed * counted))
         return frequency, closed * frequency
-    return _of_one_cycle(loop, clock, x, times)
+    return _frequency_of_single_cycle(loop, clock, x, times)
 
 
-def _of_one_cycle(loop: Loop, clock: Array, x: Array, crossings: Array) -> tuple[float, float]:
+def _frequency_of_single_cycle(loop: Loop, clock: Array, x: Array, crossings: Array) -> tuple[float, float]:
     """Frequency [Hz] and number of cycles of a loop whose motion crosses its middle once upwards and once downwards.
 
     Args:
@@ -185,7 +185,7 @@ def _of_one_cycle(loop: Loop, clock: Array, x: Array, crossings: Array) -> tuple
     meets = gap < _CLOSED * np.ptp(x) / 2.0 + 1.5 * stride
     if closed > (_MORE_THAN_ONE_THAT_MEETS if meets else _MORE_THAN_ONE) * 2.0 * stroke:
         frequency = _refine_frequency(clock, x, 0.5 / stroke, rows)
-        if closed * frequency > 1.0 and _repeats(clock, x, 1.0 / frequency):
+        if closed * frequency > 1.0 and _is_periodic(clock, x, 1.0 / frequency):
             return frequency, closed * frequency
     if gap > _OPEN * np.ptp(x):
         raise FitError(
@@ -206,7 +206,7 @@ def _period_by_ends(clock: Array, x: Array, duration: float, whole: float) -> fl
     Args:
         clock, x: time [s] and motion relative to its middle, (n,) each.
         duration: duration of the record [s].
-        whole: expected period [s], which is returned unless the ends show a significantly shorter one.
+        whole: expected period [s], which is returned unless the ends show a shorter one.
     """
     few, ends = max(3, int(0.02 * x.size)), []
     for rows, origin in ((slice(few), clock[0]), (slice(-few, None), clock[-1])):
@@ -254,8 +254,8 @@ def _refine_frequency(clock: Array, x: Array, frequency: float, rows_per_cycle: 
     return frequency
 
 
-def _repeats(clock: Array, x: Array, period: float) -> bool:
-    """Return True if a motion repeats: its last rows agree with its rows one period earlier.
+def _is_periodic(clock: Array, x: Array, period: float) -> bool:
+    """True if the last rows of a motion agree with its rows one period earlier.
 
     Args:
         clock: time of each row [s], (n,).
@@ -271,7 +271,7 @@ def _repeats(clock: Array, x: Array, period: float) -> bool:
 
 
 def waveform(coefficients: Array) -> str:
-    """Text that names a waveform, such as "a sine", from its complex harmonics, mean first."""
+    """Name of a waveform, "a sine" or "a triangle" for example, from its complex harmonics, mean first."""
     share = abs(coefficients[3]) / abs(coefficients[1]) if coefficients.size > 3 else 0.0
     if abs(share - 1.0 / 9.0) < _LIKE:
         return "a triangle"

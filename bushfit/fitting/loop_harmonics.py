@@ -57,7 +57,7 @@ class LoopHarmonics(NamedTuple):
 
     Args:
         motion: complex harmonics of the displacement that exceed its noise, mean first [m or rad].
-        motion_scatter: standard deviation of the displacement of the rows from its harmonics [m or rad].
+        motion_scatter: standard deviation of the rows' displacement from its harmonics [m or rad].
         force: complex harmonics of the force, mean first [N or N m].
         force_noise: standard deviation of one row's force [N or N m].
         outliers: outliers of the columns "displacement" and "force", by name.
@@ -158,7 +158,7 @@ def _remove_noise(coefficients: Array, noise: float, phase: Array, displacement:
         inliers: mask of the rows that are no outliers, (n,).
 
     Returns:
-        Harmonics without noise, of the same shape as `coefficients`.
+        Complex harmonics without noise, mean first [m or rad]: up to the last that is kept, or 512 of a triangle.
     """
     order, fundamental = np.arange(1, GRID // 2, 2), coefficients[1]
     turn, triangle = 1j * fundamental / abs(fundamental), np.zeros(GRID // 2, dtype=complex)
@@ -173,7 +173,7 @@ def _remove_noise(coefficients: Array, noise: float, phase: Array, displacement:
 
 
 def remove_slow_changes(phase: Array, residual: Array) -> tuple[Array, int]:
-    """Remove settling and drift, which are not noise, from force residuals: mean and three harmonics of each cycle.
+    """Remove settling and drift from force residuals: the mean and three harmonics of each cycle, fitted to its rows.
 
     Args:
         phase: position of each row [cycles], (n,).
@@ -253,7 +253,12 @@ def _inliers(columns: Array, values: Array, solution: Array, stuck: Array) -> Ar
 
 
 def _noise(solution: Array, residual: Array) -> float:
-    """Standard deviation of one row's noise: robust scatter of residuals, (n,), but not below that of the best rigs."""
+    """Robust standard deviation of residuals, (n,) [m, rad, N or N m], at least 1e-4 of the first harmonic's amplitude.
+
+    Args:
+        solution: fitted mean, cosines and sines, (2 order + 1,), whose first harmonic sets the smallest noise.
+        residual: displacement or force of the rows without the fitted harmonics, (n,).
+    """
     return max(MEDIAN_TO_SIGMA * float(np.median(np.abs(residual))), FLOOR * abs(as_complex(solution)[1]))
 
 

@@ -91,7 +91,7 @@ class MeasuredLoop(MeasuredBase):
 
     @property
     def notes(self) -> Sequence[Caveat]:
-        """Warnings: left-out parts of the record, a preload, or a contradiction between loops."""
+        """Warnings on left-out parts of the record, a preload, or a contradiction with an earlier loop."""
         return [*self.record_notes, *([self.contradiction] if self.contradiction else [])]
 
     @property
@@ -228,7 +228,7 @@ class MeasuredLoop(MeasuredBase):
         """Model minus measured force at each row, relative to half the measured force range, (1, n)."""
         return ((self.response(model) - self.measured_force) / self.half_range)[None]
 
-    def relative(self, model: Model) -> Array:
+    def relative_distance(self, model: Model) -> Array:
         """Absolute difference of model and measured force at rows with weight, relative to half the force range.
 
         The mean difference is subtracted, because the zero of a load cell is unknown.
@@ -301,7 +301,7 @@ class MeasuredLoop(MeasuredBase):
         return white @ self._fundamental if self.fundamental_only else white
 
     def force_changes(self, waves: Array) -> Array:
-        """Changes of the whitened residuals, (c, size), by force changes relative to half the range, (c, n)."""
+        """Changes of the whitened residuals, (c, size), by changes of the force in units of half its range, (c, n)."""
         return self.whiten(waves * (self._per_noise * self.half_range))
 
     def whiten(self, difference: Array) -> Array:
@@ -315,7 +315,7 @@ class MeasuredLoop(MeasuredBase):
 
     @cached_property
     def _fundamental(self) -> Array:
-        """Orthonormal basis of the changes of the n whitened rows by a first harmonic of any size and phase, (n, 2)."""
+        """Orthonormal basis of the changes of the n whitened rows by the first harmonic of the force, (n, 2)."""
         waves = self.row_noise.whiten(basis(self.phase, 1).T[1:] * self._per_noise)
         return np.linalg.qr((waves * self._usable_rows).T)[0]
 
@@ -350,10 +350,11 @@ class MeasuredLoop(MeasuredBase):
 
     @cached_property
     def unit_model_error(self) -> SharedErrors:
-        """Model error with a standard deviation of half the force range, as independent errors that change all rows.
+        """Error of the model's force with a standard deviation of 100 % of half the force range, to be scaled.
 
-        The errors are the cosine and sine of each harmonic and an offset; for a loop from rest, also a deviation of the
-        first cycle and a drift.
+        It is a sum of independent errors: cosine and sine of harmonics 1 to 25, of equal size up to the fifth and
+        falling as 1/h above, and an offset; for a loop from rest, also the same harmonics in the first cycle alone, and
+        a drift. Without `first_harmonic_errs`, the rig's gain error replaces the first harmonic.
         """
         phase = self.phase
         waves = basis(phase, _ERROR_HARMONICS).T[1:] * np.tile(_ERROR_SIZES, 2)[:, None]
@@ -368,13 +369,13 @@ class MeasuredLoop(MeasuredBase):
         return SharedErrors.from_columns(np.concatenate((rows, _ERROR_SIZES[:1, None] * self._unit_offset)))
 
     def noise_sensitivity(self, influence: Array) -> dict[Hashable, Array]:
-        """Change of k parameter estimates by an error of each noise variance that was estimated from all rows.
+        """Change of the weights of the residuals in k estimates by one standard error of each noise variance.
 
-        `influence`: change of each estimate per unit of each whitened residual, (k, size).
+        Args:
+            influence: change of each estimate per unit of each whitened residual, (k, size).
 
         Returns:
-            By identifier of the variance, (k, size): change of the influence of each residual by one standard error of
-            the variance.
+            Changes of `influence`, (k, size), by identifier of the noise variance.
         """
         reaction = self.shared_errors.whiten(influence)
         parts = self.row_noise.noise_sensitivity(reaction)

@@ -34,9 +34,10 @@ _SAME_IN_REPEATS = {"temperature", "preload"}
 class MeasuredSweep(MeasuredBase):
     """Measured sweep: dynamic stiffness at n points, with residuals in gain and phase.
 
-    `MeasuredBase` documents the methods of every test. Points are sorted by run (constant value, repeat), then by step;
-    a run is a block. The residual ln(K/K_meas) of model K has the gain error in its real and the phase error in its
-    imaginary part. A line is the set of all runs with the same constant value.
+    `MeasuredBase` documents the methods of every test. A run (block) is one recording at a constant amplitude or
+    frequency, and a level is the set of all runs (repeats) with the same constant value. Points are sorted by constant
+    value, repeat and step. The residual ln(K/K_meas) of model K has the gain error in its real and the phase error in
+    its imaginary part.
 
     Args:
         test: measured data.
@@ -53,9 +54,9 @@ class MeasuredSweep(MeasuredBase):
         repeat: number of the repeat of each point, (n,).
 
     Notes:
-        Within a block of points with scatter s_i and a shared error t the covariance is V = diag(s_i^2) + t^2 1 1^T.
-        All runs of a line may also share an error, u^2 1 1^T over the line. A deviation is whitened by dividing it by
-        s_i and removing the error shared by its block; then the error shared by its line is removed in the same way. A
+        Within a run of points with random noise s_i and a shared error t the covariance is V = diag(s_i^2) + t^2 1 1^T.
+        All runs of a level may also share an error, u^2 1 1^T over the level. A deviation is whitened by dividing it by
+        s_i and removing the error shared by its block; then the error shared by its level is removed in the same way. A
         point of weight w has s_i^2 = s^2/w; a point of weight 0 has no effect, not even on shared errors.
     """
 
@@ -129,7 +130,7 @@ class MeasuredSweep(MeasuredBase):
 
     @property
     def relative_noise(self) -> float:
-        """Standard deviation of a point, relative to |K|: root mean square over gain and phase of all sweeps."""
+        """Standard deviation of the random error of a point, relative to |K|: RMS over gain and phase of all sweeps."""
         return float(np.sqrt(np.mean(np.square(list(self.noise.random.values())))))
 
     def without(self, points: Array) -> Self:
@@ -158,7 +159,7 @@ class MeasuredSweep(MeasuredBase):
 
     @cached_property
     def block_starts(self) -> Array:
-        """Index of the first point of each run (block of points at one constant value and repeat), (blocks,)."""
+        """Index of the first point of each run (one recording at a constant amplitude or frequency), (runs,)."""
         label = np.stack((self.held_value, self.repeat.astype(float)))
         return np.concatenate(([0], 1 + np.flatnonzero(np.any(np.diff(label), axis=0))))
 
@@ -237,50 +238,50 @@ class MeasuredSweep(MeasuredBase):
         return (self.measured.real / np.abs(self.measured)) ** 2
 
     @cached_property
-    def scatter(self) -> Array:
-        """Standard deviation from point to point of the gain and of the phase [rad] at full weight, (2, n)."""
+    def random_noise(self) -> Array:
+        """Standard deviation of the random error of each point in relative gain and in phase [rad], (2, n)."""
         if self.test.relative_error is not None and self.test.noise is None:
             return np.maximum(np.tile(self.test.relative_error[self.order], (2, 1)), FLOOR)
-        return self.noise.scatter(self.name, self.held_value, self.step)
+        return self.noise.random_noise(self.name, self.held_value, self.step)
 
     @cached_property
-    def per_scatter(self) -> Array:
-        """Reciprocal of the scatter of each deviation, of n gains, then of n phases, (2 n,); 0 without weight."""
-        return (np.sqrt(self.weights) / self.scatter).ravel()
+    def per_noise(self) -> Array:
+        """Square root of the weight over the random noise, of n gains, then of n phases [1/rad], (2 n,)."""
+        return (np.sqrt(self.weights) / self.random_noise).ravel()
 
     @cached_property
     def _run(self) -> Array:
-        """Index of the run of each residual: of n gains, then of n phases, (2 n,)."""
+        """Number of the run of each gain, then of each phase, plus the number of runs for phases, (2 n,)."""
         starts = self.block_starts
         run = np.repeat(np.arange(starts.size), np.diff(starts, append=self.order.size))
         return np.concatenate((run, run + starts.size))
 
     @cached_property
     def run_errors(self) -> SharedErrors:
-        """Errors shared by the points of each run, acting on deviations in units of their scatter."""
-        return SharedErrors.of_groups(self._run[: self.order.size], self.per_scatter, self.noise.shared)
+        """Gain and phase error of each run, as correlated errors of the deviations in units of random noise, (2 n,)."""
+        return SharedErrors.of_groups(self._run[: self.order.size], self.per_noise, self.noise.shared)
 
-    def _line_errors(self, per_scatter: Array) -> SharedErrors:
-        """Errors shared by the runs of each line, acting on deviations multiplied by `per_scatter`, (2 n,)."""
-        return SharedErrors.of_groups(np.unique(self.held_value, return_inverse=True)[1], per_scatter, self.noise.level)
+    def _level_errors(self, per_noise: Array) -> SharedErrors:
+        """Gain and phase error of each level, as correlated errors of the deviations multiplied by `per_noise`."""
+        return SharedErrors.of_groups(np.unique(self.held_value, return_inverse=True)[1], per_noise, self.noise.level)
 
     @cached_property
-    def line_errors(self) -> SharedErrors:
-        """Errors shared by the runs of each line, acting on deviations already whitened by the errors of runs."""
-        return self._line_errors(self.per_scatter / np.hypot(1.0, self.run_errors.deviations)[self._run])
+    def level_errors(self) -> SharedErrors:
+        """Gain and phase error of each level, as correlated errors of deviations whitened by `run_errors`, (2 n,)."""
+        return self._level_errors(self.per_noise / np.hypot(1.0, self.run_errors.deviations)[self._run])
 
     @cached_property
     def unit_model_error(self) -> SharedErrors:
         """Model error of 100 % of |K| (standard deviation) in phase and in quadrature; repeats of a point share it."""
         points = np.unique(self.frequency + 1j * self.amplitude, return_inverse=True)[1]
-        return SharedErrors.of_groups(points, self.per_scatter, (1.0, 1.0))
+        return SharedErrors.of_groups(points, self.per_noise, (1.0, 1.0))
 
     def whiten(self, difference: Array) -> Array:
         """Divide deviations by their noise and remove the correlation that errors shared by points cause.
 
-        With a model error, the errors shared by runs and lines are not part of this noise: the error of the model
-        differs from line to line as well and is larger, so the smaller error of the rig must not reduce the weight of a
-        line.
+        With a model error, the errors shared by runs and levels are not part of this noise: the error of the model
+        differs from level to level as well and is larger, so the smaller error of the rig must not reduce the weight
+        of a level.
 
         Args:
             difference: relative differences in magnitude + i differences in phase [rad], complex (..., n).
@@ -289,35 +290,41 @@ class MeasuredSweep(MeasuredBase):
             Whitened residuals in units of noise, (..., 2 n): n gains, then n phases.
         """
         with np.errstate(invalid="ignore"):
-            rows = np.concatenate((difference.real, difference.imag), axis=-1) * self.per_scatter
+            rows = np.concatenate((difference.real, difference.imag), axis=-1) * self.per_noise
             return self.model_errors.whiten(rows) if self.model_error else self._whiten(rows)
 
     def _whiten(self, rows: Array) -> Array:
-        """Remove the correlation by the noise that points share from deviations in units of scatter, (..., 2 n)."""
-        return self.line_errors.whiten(self.run_errors.whiten(rows))
+        """Whiten deviations in units of random noise, (..., 2 n), by the errors that runs and levels share."""
+        return self.level_errors.whiten(self.run_errors.whiten(rows))
 
     def noise_sensitivity(self, influence: Array) -> dict[Hashable, Array]:
-        """Return changes of k estimates by an error of each estimated noise variance; see `MeasuredLoop`.
+        """Change of the weights of the residuals in k estimates by one standard error of each noise variance.
+
+        Args:
+            influence: change of each estimate per unit of each whitened residual, (k, 2 n).
+
+        Returns:
+            Changes of `influence`, (k, 2 n), by identifier of the noise variance.
 
         Notes:
-            Within a block the derivatives of V are I with respect to s^2 and 1 1^T with respect to t^2; whitened, W^2
+            Within a run the derivatives of V are I with respect to s^2 and 1 1^T with respect to t^2; whitened, W^2
             and (W 1)(W 1)^T. The estimate of t^2 is a mean of `freedom` squares with expectation t^2 + s^2/n; its error
-            is limited to t^2. The same applies to errors shared by lines.
+            is limited to t^2. The same applies to errors shared by levels.
         """
-        runs, lines, noise, reactions = self.run_errors, self.line_errors, self.noise, dict[str, Array]()
-        rows = lines.whiten(influence)
-        if noise.scatter_freedom:
-            reactions["scatter"] = self._whiten(runs.whiten(rows)) * np.sqrt(2.0 / noise.scatter_freedom)
+        runs, levels, noise, reactions = self.run_errors, self.level_errors, self.noise, dict[str, Array]()
+        rows = levels.whiten(influence)
+        if noise.random_freedom:
+            reactions["scatter"] = self._whiten(runs.whiten(rows)) * np.sqrt(2.0 / noise.random_freedom)
         if noise.freedom:
             variance = np.square(runs.deviations)
             _, first, counts = np.unique(self._run, return_index=True, return_counts=True)
-            scatter = np.bincount(self._run, np.square(self.per_scatter)) * np.square(self.scatter.ravel()[first])
+            scatter = np.bincount(self._run, np.square(self.per_noise)) * np.square(self.random_noise.ravel()[first])
             error = np.minimum((variance + scatter / counts) * np.sqrt(2.0 / noise.freedom), variance)
-            reactions["shared"] = lines.whiten(runs.multiply(rows, error / (1.0 + variance)))
+            reactions["shared"] = levels.whiten(runs.multiply(rows, error / (1.0 + variance)))
         if noise.level_freedom:
-            variance = np.square(lines.deviations)
+            variance = np.square(levels.deviations)
             error = np.minimum((variance + 1.0) * np.sqrt(2.0 / noise.level_freedom), variance)
-            reactions["level"] = lines.multiply(rows, error / np.hypot(1.0, lines.deviations))
+            reactions["level"] = levels.multiply(rows, error / np.hypot(1.0, levels.deviations))
         is_gain = np.arange(self.size) < self.order.size
         return {
             (id(noise), kind, part): reaction * only
@@ -328,18 +335,18 @@ class MeasuredSweep(MeasuredBase):
     def extra_covariance(self, influence: Array) -> Array:
         """Covariance to add to that of k parameter estimates, for errors that the weights of the fit lack, (k, k).
 
-        If the fit assumes a model error, errors shared by runs and lines are added; the independent model error is
+        If the fit assumes a model error, errors shared by runs and levels are added; the independent model error is
         subtracted, because a smooth error of the model, which the fit adds separately, contains it.
 
         Args:
             influence: change of each estimate per unit of each whitened residual, (k, 2 n).
         """
         whitened = self.model_errors.whiten(influence)
-        added = self.run_errors.covariance(whitened) + self._line_errors(self.per_scatter).covariance(whitened)
+        added = self.run_errors.covariance(whitened) + self._level_errors(self.per_noise).covariance(whitened)
         return np.asarray(added - self.model_errors.covariance(whitened))
 
     def with_independent_noise(self) -> Self:
-        """Return the sweep with its scatter alone, without model error and errors that runs and lines share."""
+        """Return the sweep with random noise alone, without model error and errors that runs and levels share."""
         return replace(self, noise=replace(self.noise, shared=(0.0, 0.0), level=(0.0, 0.0)), model_error=0.0)
 
     def relative_difference(self, model: Model) -> Array:
@@ -347,44 +354,44 @@ class MeasuredSweep(MeasuredBase):
         difference = (self.response(model) - self.measured) / np.abs(self.measured)
         return np.stack((difference.real, difference.imag))
 
-    def scaled(self, deviation: Array, *, shared: bool = True) -> Array:
-        """Divide the deviations in gain and phase by the scatter of each point, without whitening.
+    def normalised(self, deviation: Array, *, shared: bool = True) -> Array:
+        """Divide the deviations in gain and phase by the random noise of each point, without whitening.
 
         Args:
             deviation: relative differences in magnitude + i differences in phase [rad], complex (n,).
             shared: True to subtract the likeliest error that all points of a run share.
 
         Returns:
-            Gain and phase of each point in units of the scatter, (2, n).
+            Gain and phase of each point in units of the random noise, (2, n).
         """
         rows = np.concatenate((deviation.real, deviation.imag))
         if shared:
-            squares = np.square(self.per_scatter)
+            squares = np.square(self.per_noise)
             sums, weights = (np.bincount(self._run, values) for values in (rows * squares, squares))
             variance = np.repeat(np.square(self.noise.shared) + np.square(self.noise.level), weights.size // 2)
             rows = rows - (sums * variance / (1.0 + variance * weights))[self._run]
-        return rows.reshape(2, -1) / self.scatter
+        return rows.reshape(2, -1) / self.random_noise
 
     def distance(self, model: Model) -> Array:
         """Distance of each point from the model in units of noise, (n,): root mean square of gain and phase deviation.
 
         The likeliest error that all points of a run share is subtracted first.
         """
-        return np.hypot(*self.scaled(self.deviation(self.response(model)))) / np.sqrt(2.0)
+        return np.hypot(*self.normalised(self.deviation(self.response(model)))) / np.sqrt(2.0)
 
     def displayed_residual(self, model: Model) -> Array:
-        """Whitened residuals for charts, (2 n,); those of points without weight are in units of the scatter alone."""
+        """Whitened residuals for charts, (2 n,); points without weight are divided by their random noise only."""
         deviation = self.deviation(self.response(model))
-        return np.where(np.tile(self.weights > 0.0, 2), self.whiten(deviation), self.scaled(deviation).ravel())
+        return np.where(np.tile(self.weights > 0.0, 2), self.whiten(deviation), self.normalised(deviation).ravel())
 
     def outlier_indices(self, model: Model) -> Array:
-        """Indices of the points that are farther from the model and from their neighbours than noise explains, (k,)."""
-        points, freedom = np.stack((self.frequency, self.amplitude)), self.noise.scatter_freedom or np.inf
+        """Indices of the outliers, (k,): points far from the model and their neighbours; see `outlying_points`."""
+        points, freedom = np.stack((self.frequency, self.amplitude)), self.noise.random_freedom or np.inf
         deviation = self.deviation(self.response(model))
-        return outlying_points(deviation, self.scaled, self.block_starts, points, freedom)
+        return outlying_points(deviation, self.normalised, self.block_starts, points, freedom)
 
     def outliers(self, points: Array, model: Model) -> Iterator[Outlier]:
-        """Yield file, row and distance from the model of the outliers with the indices `points`."""
+        """Yield file, row and distance from the model [units of noise] of the points with the indices `points`."""
         file = str(self.source.file) if self.source else None
         distance = self.distance(model)[points].tolist()
         for row, noise_units in sorted(zip((self.order[points] + 1).tolist(), distance, strict=True)):

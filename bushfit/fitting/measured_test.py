@@ -83,7 +83,7 @@ class MeasuredBase(ABC):
     @property
     @abstractmethod
     def unit_model_error(self) -> SharedErrors:
-        """Model error with a standard deviation of 100 %, as independent errors that each change several residuals."""
+        """Error of the model with a standard deviation of 100 % of |K|, or of half the force range of a loop."""
 
     def with_model_error(self, size: float) -> Self:
         """Return the test with a model error of this size, relative to |K| or half a loop's force range."""
@@ -93,11 +93,11 @@ class MeasuredBase(ABC):
 
     @cached_property
     def model_errors(self) -> SharedErrors:
-        """Error of the model of the size `model_error`, as independent errors that each change several residuals."""
+        """Error of the model with the standard deviation `model_error`, as correlated errors of the residuals."""
         return replace(self.unit_model_error, deviations=self.model_error * self.unit_model_error.deviations)
 
     def weighted(self, weight: Array) -> Self:
-        """Return the test with the weight of each of its n points multiplied by a factor, (n,)."""
+        """Return the test with the weight of each of its n points multiplied by `weight`, (n,)."""
         return replace(self, weights=self.weights * weight)
 
     def misfit(self, model: Model) -> Array:
@@ -113,7 +113,7 @@ class MeasuredBase(ABC):
         return self
 
     def fundamental(self) -> Self:
-        """Return a loop that is compared by its first harmonic only, as one operating point; a sweep is unchanged."""
+        """Return a loop whose residuals are the two of its first harmonic, as one operating point; sweeps unchanged."""
         return self
 
     @property
@@ -136,14 +136,14 @@ class MeasuredBase(ABC):
         """Source file of the test; None for a simulated test."""
         return self.test.source
 
-    def relative(self, model: Model) -> Array:
-        """Magnitude of the relative difference of model and test at each point with weight, (n,), for the NRMSE.
+    def relative_distance(self, model: Model) -> Array:
+        """Absolute relative difference of model and test at the w points with weight, (w,), for the NRMSE.
 
         The difference of the complex stiffness is relative to |K|, that of a loop's force to half the force range.
         """
         return np.linalg.norm(self.relative_difference(model)[:, self.weights > 0.0], axis=0)
 
-    def change(self, model: Model, reference: Model) -> float:
+    def largest_difference(self, model: Model, reference: Model) -> float:
         """Largest difference between two models over the points of the test.
 
         Returns:

@@ -38,8 +38,8 @@ from bushfit.fitting.discrepancy import (
     SIZES,
     Discrepancy,
     FittedTests,
-    averaged,
-    discrepancies,
+    average_processes,
+    candidate_processes,
 )
 from bushfit.fitting.levels import LevelErrors, level_error_columns, level_errors
 from bushfit.fitting.noise import SweepNoise
@@ -74,16 +74,16 @@ _MAXIMUM_ROUNDS, _SETTLED = 12, 0.02
 def with_excess_errors(
     plain_fit: FitResult, bounds: Bounds, rig: RigSettings, refit: Callable[[LevelErrors], FitResult]
 ) -> tuple[FitResult, Unnamed | None, list[Caveat]]:
-    """Repeat a fit with errors that its tests show beyond the noise: of the model, or of levels (constant amplitudes).
+    """Repeat a fit with errors beyond the noise that its tests show: of the model, or shared by the runs of a level.
 
-    If levels disagree by more than chance explains, the rig or the model may be the cause, so the fit includes errors
-    of both.
+    A level is one constant amplitude or frequency. If levels disagree by more than chance explains, the rig or the
+    model may be the cause, so the fit includes errors of both.
 
     Args:
         plain_fit: least-squares fit with the noise alone.
         bounds: limits of parameters [SI], inside their default limits.
         rig: accuracy class of the rig (stated gain and phase errors).
-        refit: function that repeats the fit with errors of levels in the noise.
+        refit: function that repeats the fit with the given errors of levels in the noise.
 
     Returns:
         The fit; the error of the model as a correction of the stiffness, or None; and a warning if the model misses its
@@ -139,13 +139,13 @@ def with_model_error(
     with_levels = _with_unseen_level_errors(plain_fit.problem.tests, rig)
     tests = FittedTests(closest.reevaluate(closest.model, _thin_sweeps(with_levels, size)))
     sizes = np.geomspace(_SMOOTH_RATIO[0] * size, _SMOOTH_RATIO[1] * size, 9)
-    processes = [replace(process, sizes=sizes) for process in discrepancies(tests)]
-    likeliest = max(processes, key=lambda process: process.best[0])
-    error = averaged(processes)
+    processes = [replace(process, sizes=sizes) for process in candidate_processes(tests)]
+    likeliest = max(processes, key=lambda process: process.maximum[0])
+    error = average_processes(processes)
     if error.rms >= SIZES[-1]:
         return plain_fit, None
     weighed = [test.with_model_error(size) for test in plain_fit.covariance_tests or with_levels]
-    fitted, likeliest_size = closest.reevaluate(closest.model, weighed), likeliest.best[1]
+    fitted, likeliest_size = closest.reevaluate(closest.model, weighed), likeliest.maximum[1]
     process = Discrepancy.over_tests(FittedTests(fitted), likeliest.groups, likeliest.lengths, MAXIMUM_NODES)
     freedom = likeliest.likelihood.freedom(likeliest_size)
     smooth_error = SmoothError(likeliest_size * process.columns, process.tests.project, freedom)
@@ -235,9 +235,10 @@ def likeliest_model_error(model: Model, data_sets: Sequence[MeasuredTest], names
 
 
 def log_likelihood(solution: FitResult, prior_precision: Mapping[str, float]) -> float:
-    """Natural log of the likelihood of a fit, integrated over the parameters that are not at a bound.
+    """Natural log of the evidence of a fit: its likelihood, integrated over the parameters that are not at a bound.
 
-    If the model misses the tests, a Gaussian process is added to the noise and its sizes and lengths are averaged over.
+    The integral is by Laplace's method. If the model misses the tests, the errors include a Gaussian process, and the
+    likelihood is averaged over the process's sizes and lengths.
 
     Args:
         solution: result of the fit.
@@ -253,7 +254,7 @@ def log_likelihood(solution: FitResult, prior_precision: Mapping[str, float]) ->
     rows, residual = tests.free_jacobian, tests.solution.residual
     information, gain = rows @ rows.T, 0.0
     if size:
-        components, processes = tests.project(residual), discrepancies(tests)
+        components, processes = tests.project(residual), candidate_processes(tests)
         columns = [process.columns for process in processes]
         likelihoods = [
             RestrictedLikelihood.from_columns(rows, components, np.empty((0, components.size))) for rows in columns
@@ -275,7 +276,7 @@ def log_likelihood(solution: FitResult, prior_precision: Mapping[str, float]) ->
 
 
 def _exceeds_noise(tests: FittedTests) -> bool:
-    """True if chi-square, of all tests or of one, is too large for the noise and the errors of the rig."""
+    """True if chi-square, of all tests or of one, exceeds its expectation by 5 standard deviations."""
     solution, counts = tests.solution, [test.residual_count for test in tests.data_sets]
     squares = [float(np.sum(np.square(solution.residual[rows]))) for rows in residual_slices(tests.data_sets)]
     freedom = max(sum(counts) - len(solution.names), 1)
@@ -287,14 +288,15 @@ def _is_smooth(tests: FittedTests) -> bool:
     """True if the misfit is more probable with a smooth error of the model than with errors of noise and rig alone."""
     names = tuple(dict.fromkeys(tests.directions.tolist()))
     compound = Discrepancy.over_tests(tests, (names,), COMPOUND_LENGTHS, _FEW)
-    if compound.best[0] > _SHOWS and compound.likelihood.log_evidence(SIZES) > 0.0:  # as probable before as its absence
+    # such an error is as probable before the tests as its absence
+    if compound.maximum[0] > _SHOWS and compound.likelihood.log_evidence(SIZES) > 0.0:
         return True
     quick = [Discrepancy.over_tests(tests, (names,), _MIDDLING, _FEW)]
     if tests.directions.size > _DENSE:
         quick.append(Discrepancy.over_tests(tests, (names,), (OVER_FREQUENCY[0], OVER_STRAIN[-1]), MAXIMUM_NODES))
-    if max(process.best[0] for process in quick) <= _SHOWS:
+    if max(process.maximum[0] for process in quick) <= _SHOWS:
         return False
-    evidence = [process.likelihood.log_evidence(SIZES) for process in discrepancies(tests)]
+    evidence = [process.likelihood.log_evidence(SIZES) for process in candidate_processes(tests)]
     return float(np.logaddexp.reduce(evidence)) - np.log(len(evidence)) + np.log(_ODDS) >= 0.0
 
 
@@ -306,7 +308,7 @@ def _with_unseen_level_errors(tests: Sequence[MeasuredTest], rig: RigSettings) -
     """
 
     def with_level(noise: SweepNoise) -> SweepNoise:
-        """Raise the errors of levels in a noise from repeats to the size that [rig] states or bushfit assumes."""
+        """Raise the errors shared by a level to the size that [rig] states or bushfit assumes, if noise has repeats."""
         if noise.origin != "repeats":
             return noise
         gain, phase = np.maximum(class_errors(rig, UNSTATED_LEVEL), noise.level).tolist()

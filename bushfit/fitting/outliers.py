@@ -53,7 +53,7 @@ def outlier_limit(rows: int, parts: int, freedom: float) -> float:
 
 
 def are_outliers(residual: Array, recorded: Array, limit: float) -> Array:
-    """Mask of the rows that are far from a curve, and are also far from their neighbours or repeat a stuck value.
+    """Mask of the rows that are far from a curve, and are also far from their neighbours or repeat one value.
 
     Args:
         residual: distance of each row from the curve, (n,).
@@ -80,7 +80,7 @@ def are_outliers(residual: Array, recorded: Array, limit: float) -> Array:
 
 
 def are_stuck(recorded: Array) -> Array:
-    """Mask of the rows in which a noisy displacement or force repeats the row before in an improbably long run.
+    """Mask of the rows that repeat the row before, in a run so long that chance gives it in under 1 % of records.
 
     Args:
         recorded: displacement or force of each row, (n,).
@@ -103,9 +103,9 @@ def are_stuck(recorded: Array) -> Array:
 
 
 def gross_outliers(values: Array) -> Array:
-    """Find rows of a periodic motion, of unknown period, that are far from the median of their neighbours.
+    """Find rows of a motion farther than 15 % of its range from the median of the 11, else 5, rows around them.
 
-    Many such rows mean that the motion turns within the width of the median; then no row is returned.
+    If 10 % of the rows or more are so far, the motion turns within that width, and no row is returned.
 
     Returns:
         Row indices, (k,).
@@ -127,17 +127,18 @@ def _run_lengths(mask: Array) -> Array:
 
 
 def outlying_points(
-    deviation: Array, scaled: Callable[..., Array], starts: Array, points: Array, freedom: float
+    deviation: Array, normalised: Callable[..., Array], starts: Array, points: Array, freedom: float
 ) -> Array:
     """Find points of a sweep that are farther from the model and from their neighbours than noise explains.
 
-    A repeated point must also differ from its repeats. If two or more repeats agree and the point differs from them,
-    its neighbours are not compared, so that neither adjacent outliers nor a misfit of the model can hide the outlier.
-    If several points of one operating point qualify, the farthest is an outlier even if it is near the model.
+    The limit is the distance that noise alone exceeds in 1 % of tests, times `misfit_scale`. A repeated point must also
+    differ from its repeats. If two or more repeats agree and the point differs from them, its neighbours are not
+    compared, so that neither adjacent outliers nor a misfit of the model can hide the outlier. If several repeats of
+    one operating point qualify, the one farthest from the others is an outlier even if it is near the model.
 
     Args:
-        deviation: deviation of each point from the model, gain + i phase, complex (n,).
-        scaled: function from deviations to gain and phase in units of noise, (2, n); with `shared=False` the errors
+        deviation: deviation of each point from the model, relative gain + i phase [rad], complex (n,).
+        normalised: function from deviations to gain and phase in units of noise, (2, n); with `shared=False` the errors
             shared by a block are not subtracted.
         starts: index of the first point of each block (run).
         points: frequency and amplitude of each point, (2, n); points with equal values are repeats.
@@ -146,15 +147,15 @@ def outlying_points(
     Returns:
         Indices of the outliers, (k,).
     """
-    distance = np.hypot(*scaled(deviation))
+    distance = np.hypot(*normalised(deviation))
     by_noise = outlier_limit(deviation.size, 2, freedom)
     limit = by_noise * misfit_scale(distance, 2)
     far = distance > limit
-    local = _from_neighbours(deviation, starts, _FEW_NEIGHBOURS)
+    local = _difference_from_neighbours(deviation, starts, _FEW_NEIGHBOURS)
     _, point_index = np.unique(points, axis=1, return_inverse=True)
-    repeats, from_repeats = _from_repeats(local, point_index)
-    against = _from_neighbours(_from_repeats(deviation, point_index)[1], starts, NEIGHBOURS)
-    alone, repeated, agreed = (np.hypot(*scaled(part, shared=False)) for part in (local, from_repeats, against))
+    repeats, from_repeats = _difference_from_repeats(local, point_index)
+    against = _difference_from_neighbours(_difference_from_repeats(deviation, point_index)[1], starts, NEIGHBOURS)
+    alone, repeated, agreed = (np.hypot(*normalised(part, shared=False)) for part in (local, from_repeats, against))
     alone = np.minimum(alone, np.where(repeats > 0, repeated, np.inf))
     agreed /= np.sqrt(1.0 + np.pi / 2.0 / np.maximum(repeats, 1))  # the median of n repeats: pi/(2 n) of the variance
     farthest = np.zeros(point_index.max() + 1)
@@ -188,7 +189,7 @@ def contradictions(stiffness: Array, point_index: Array) -> list[tuple[float, in
 
 
 def misfit_scale(distance: Array, parts: int) -> float:
-    """Median distance of points from the model, relative to the median that noise alone causes; at least 1.
+    """Ratio of the median distance of points from the model to the median that noise alone causes; at least 1.
 
     Args:
         distance: distance of each point in units of noise, (n,).
@@ -199,12 +200,12 @@ def misfit_scale(distance: Array, parts: int) -> float:
     return max(1.0, float(np.median(distance) / np.sqrt(chdtri(parts, 0.5))))
 
 
-def _from_neighbours(values: Array, starts: Array, window: int) -> Array:
-    """Difference of each value from the median of the values around it in its block, complex (n,).
+def _difference_from_neighbours(values: Array, starts: Array, window: int) -> Array:
+    """Difference of each deviation from the median of its neighbours in the same run, itself included, complex (n,).
 
     Args:
-        values: deviations, complex (n,).
-        starts: index of the first point of each block (run).
+        values: deviations from a model, gain + i phase [rad], complex (n,).
+        starts: index of the first point of each run.
         window: number of values in each median.
     """
     sizes, local = np.diff(starts, append=values.size), np.zeros_like(values)
@@ -217,11 +218,11 @@ def _from_neighbours(values: Array, starts: Array, window: int) -> Array:
     return local
 
 
-def _from_repeats(values: Array, point_index: Array) -> tuple[Array, Array]:
+def _difference_from_repeats(values: Array, point_index: Array) -> tuple[Array, Array]:
     """Number of other repeats of each point, (n,), and its difference from their median (0 without any), complex (n,).
 
     Args:
-        values: deviations, complex (n,).
+        values: deviations from a model, gain + i phase [rad], complex (n,).
         point_index: index of the operating point of each point, (n,); points with equal indices are repeats.
     """
     counts = np.bincount(point_index)
@@ -244,7 +245,7 @@ def least_absolute(basis: Array, values: Array, smallest: float) -> Array:
     Args:
         basis: values of k functions at the points, (n, k).
         values: values to fit, m per point, (n, m).
-        smallest: distance, in the unit of `values`, below which all points have about the same weight.
+        smallest: distance, in the unit of `values`, below which points do not gain weight.
     """
     root_weight = np.ones((len(values), 1))
     for _ in range(25):  # chosen: nine of ten curves have then come within a third of the noise of where they end

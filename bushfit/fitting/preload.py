@@ -21,7 +21,7 @@ from bushfit.fitting.levels import level_errors
 from bushfit.fitting.preparation import MeasuredTest, split_by_kind, with_gain_weighting, with_level_errors
 from bushfit.fitting.problem import FitProblem, FitResult
 from bushfit.fitting.rig_class import largest_error
-from bushfit.fitting.robust import estimate
+from bushfit.fitting.robust import solve_problem
 from bushfit.geometry import STRAINING, Place, get_place
 from bushfit.model.result import Alternative, PreloadRange
 from bushfit.reading.preload import SAME_PRELOAD
@@ -43,7 +43,7 @@ _CHI_SQUARE_95 = 3.84
 
 
 def with_preload(data: PreparedCampaign) -> PreparedCampaign:
-    """Add the effect of preload to the model of a campaign if its tests show an influence of the preload.
+    """Add the effect of preload to the model of a campaign if an F-test (p < 0.01) shows an influence of preload.
 
     Args:
         data: campaign with prepared tests.
@@ -108,7 +108,7 @@ def alternative_preload_law(found: FitResult) -> tuple[Alternative, ...]:
         return ()
     names = [other.get(name, name) for name in found.names]
     model = found.model.with_values(dict.fromkeys(free, 0.0))
-    fitted = estimate(replace(found.problem, model=model, names=names))
+    fitted = solve_problem(replace(found.problem, model=model, names=names))
     if fitted.chi_square > found.chi_square + _CHI_SQUARE_95:
         return ()
     return (Alternative(fitted.model, 0.5, covariance(fitted.model, [fitted.stage()], None, fitted.smooth_error)),)
@@ -131,11 +131,11 @@ def _probability_of_chance(data: PreparedCampaign, tests: Sequence[MeasuredTest]
         fixed: names of parameters that stay fixed.
     """
     tests = with_gain_weighting(tests, weigh=True)
-    plain, full = _fits(data, data.problem(data.starting_model(data.effects, tests), tests), fixed)
+    plain, full = _fit_both(data, data.problem(data.starting_model(data.effects, tests), tests), fixed)
     errors = level_errors(full.problem.tests, full.residual, full.jacobian, largest_error(data.campaign.rig))
     if errors.significant:
         tests = with_level_errors(tests, errors.error, errors.freedom)
-        plain, full = _fits(data, replace(plain.problem, model=plain.model, tests=tests), fixed)
+        plain, full = _fit_both(data, replace(plain.problem, model=plain.model, tests=tests), fixed)
     # the errors that a run shares are as uncertain as the repeats are few
     estimated = [sweep.noise.freedom for sweep in split_by_kind(tests)[1] if sweep.noise.freedom]
     added, freedom = len(full.names) - len(plain.names), min([full.residual.size - len(full.names), *estimated])
@@ -143,7 +143,7 @@ def _probability_of_chance(data: PreparedCampaign, tests: Sequence[MeasuredTest]
     return float(fdtrc(added, freedom, max(plain.chi_square - full.chi_square, 0.0) / (added * variance)))
 
 
-def _fits(data: PreparedCampaign, problem: FitProblem, fixed: Sequence[str]) -> tuple[FitResult, FitResult]:
+def _fit_both(data: PreparedCampaign, problem: FitProblem, fixed: Sequence[str]) -> tuple[FitResult, FitResult]:
     """Fit the tests of a problem twice: without and with the effect of preload.
 
     Args:
@@ -154,7 +154,7 @@ def _fits(data: PreparedCampaign, problem: FitProblem, fixed: Sequence[str]) -> 
     Returns:
         The fit without the effect, and the fit with it.
     """
-    plain = estimate(problem, robust=data.robust)
+    plain = solve_problem(problem, robust=data.robust)
     model = plain.model.with_effect(PRELOAD)
     added = [name for name in model.parameters if name.startswith(f"{PRELOAD}.") and name not in fixed]
-    return plain, estimate(replace(problem, model=model, names=[*problem.names, *added]), robust=data.robust)
+    return plain, solve_problem(replace(problem, model=model, names=[*problem.names, *added]), robust=data.robust)

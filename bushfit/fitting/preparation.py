@@ -40,7 +40,7 @@ _Kind = TypeVar("_Kind", MeasuredLoop, MeasuredSweep)
 def prepare_loops(
     loops: Sequence[Loop], rig: RigSettings = UNSTATED, *, without_outliers: bool = False
 ) -> list[MeasuredLoop]:
-    """Prepare measured loops for a fit, each with its noise and a note if it contradicts an earlier loop.
+    """Prepare measured loops for a fit, each with its noise and a warning if it contradicts an earlier loop.
 
     Args:
         loops: measured loops.
@@ -67,12 +67,12 @@ def with_gain_errors(loops: Sequence[MeasuredLoop], rig: RigSettings) -> list[Me
 
 
 def with_gain_weighting(data_sets: Iterable[MeasuredTest], *, weigh: bool) -> list[MeasuredTest]:
-    """Copy tests, and set if gain errors of loops affect the weights of the fit (`weigh`) or only the uncertainty."""
+    """Return tests whose loops' gain errors are part of the weights of the fit (`weigh`), or only of uncertainties."""
     return [replace(test, gain_weighs=weigh) if isinstance(test, MeasuredLoop) else test for test in data_sets]
 
 
 def repeats_of(loops: Sequence[MeasuredLoop]) -> Array:
-    """Mask of the pairs among n loops that are repeats: same direction, preload, amplitude and frequency, (n, n)."""
+    """Mask of the pairs of n loops with equal direction and preload, and amplitude and frequency within 2 %, (n, n)."""
     conditions = np.log([(*loop.amplitude, *loop.frequency) for loop in loops]).reshape(-1, 2)
     place = np.array([f"{loop.direction} {loop.test.preload}" for loop in loops])
     return np.all(np.abs(conditions[:, None] - conditions) <= SAME_LOOP, axis=-1) & (place[:, None] == place)
@@ -116,7 +116,7 @@ def prepare_sweeps(
 
 
 def _with_contradictions(tests: Sequence[_Kind], conditions: Sequence[Array]) -> list[_Kind]:
-    """Add a warning to each test that contradicts an earlier test, on the pair of points that differs most.
+    """Add a warning to each test whose stiffness differs by 10 % or more from an earlier test of the same point.
 
     Args:
         tests: loops, or sweeps.

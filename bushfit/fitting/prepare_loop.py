@@ -58,8 +58,11 @@ _PRELOADED = 0.25
 def prepare_loop(loop: Loop, *, without_outliers: bool = False) -> MeasuredLoop:
     """Prepare a loop for a fit: find its cycles, remove the noise of its displacement, and weight its force.
 
-    Outliers of displacement or force do not affect cycles, motion and noise. With `without_outliers`, rows whose force
-    is an outlier get no weight.
+    Outliers of displacement or force do not affect cycles, motion and noise.
+
+    Args:
+        loop: loop as read from a file.
+        without_outliers: True to give weight 0 to rows whose force is an outlier.
 
     Returns:
         The loop as an input of the model, with the noise of its rows.
@@ -127,7 +130,7 @@ def prepare_loop(loop: Loop, *, without_outliers: bool = False) -> MeasuredLoop:
 
 
 def _unequal_cycles(prepared: MeasuredLoop, scatter: float) -> list[Caveat]:
-    """Compare the mean cycle of a loop with the rows that it is made of.
+    """Warning that the cycles of a loop are unequal, from the difference between its rows and its mean cycle.
 
     Args:
         prepared: the loop.
@@ -200,7 +203,7 @@ def _check_loses_energy(prepared: MeasuredLoop) -> None:
 def _with_row_noise(prepared: MeasuredLoop, loop_harmonics: LoopHarmonics) -> MeasuredLoop:
     """Estimate size and correlation of the noise of a loop's rows, or bins of phase, from its whole cycles.
 
-    If there is no whole cycle, or the noise is below that of any rig, the rows are taken to be independent.
+    If there is no whole cycle, or the noise is below 1e-4 of half the force range, the rows are taken as independent.
 
     Returns:
         The loop with its noise; the rows of a long loop, which are bins of phase, may have other weights.
@@ -244,7 +247,7 @@ def _with_row_noise(prepared: MeasuredLoop, loop_harmonics: LoopHarmonics) -> Me
 
 
 def _at_reversal(prepared: MeasuredLoop) -> Array:
-    """Mask of the rows near a turning point of the motion, where the force of dry friction jumps, (rows,)."""
+    """Mask of the rows within 1.5/1024 of a cycle of a turning point, where the force of dry friction jumps, (n,)."""
     motion, position = prepared.history(is_transient=False).value, prepared.phase * GRID
     if prepared.from_rest:
         turns = np.flatnonzero(reversals(motion))
@@ -293,7 +296,7 @@ def _starts_at_rest(loop: Loop, harmonics: LoopHarmonics, frequency: float) -> t
 
 
 def recorded_means(prepared: MeasuredLoop) -> list[Preload]:
-    """Mean displacement and mean force of a loop that are too large for a zero error of a sensor.
+    """Mean displacement and mean force of a loop, as far as they are too large for a zero error of a sensor.
 
     Returns:
         Means [m, rad or 1, and N or N m] that are too large; none, one or both.

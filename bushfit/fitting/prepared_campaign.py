@@ -64,7 +64,7 @@ class PreparedCampaign:
 
     @classmethod
     def from_campaign(cls, campaign: Campaign) -> "PreparedCampaign":
-        """Prepare the tests of a campaign as its [fit] requests.
+        """Prepare the tests of a campaign with the residuals, loss, bounds and priors of its [fit].
 
         Returns:
             The campaign with its measured tests.
@@ -86,7 +86,7 @@ class PreparedCampaign:
         return with_preload(data.with_rubber_conditions())
 
     def with_rubber_conditions(self) -> "PreparedCampaign":
-        """Return the campaign with the stated temperature and earlier strains of the session at every test point."""
+        """Return the campaign with temperature and strain history, from the stated order of tests, at every point."""
         conditions = iter(measured_session(self.campaign.bushing, [data_set.test for data_set in self.data_sets]))
         loops = tuple(replace(loop, test_conditions=next(conditions).select(0)) for loop in self.loops)
         sweeps = tuple(replace(sweep, test_conditions=next(conditions)) for sweep in self.sweeps)
@@ -105,7 +105,7 @@ class PreparedCampaign:
 
     @property
     def assumptions(self) -> list[Caveat]:
-        """Warnings about the influence of preload, and about a rig whose accuracy is neither stated nor measured."""
+        """Warnings about assumptions: on the influence of preload, and on an accuracy class of the rig not stated."""
         is_assumed = any(sweep.noise.origin == "assumed" for sweep in self.sweeps)
         if not is_assumed or None not in self.campaign.rig.stiffness_errors:
             return [*self.preload_notes]
@@ -171,10 +171,9 @@ class PreparedCampaign:
     def starting_model(
         self, effects: Sequence[str], data_sets: Sequence[MeasuredTest], stage_fixed: Mapping[str, float] | None = None
     ) -> Model:
-        """Build the model that a fit starts from.
+        """Build the model that a fit starts from, with values given in [fit] or estimated from the tests.
 
-        The start values are given in the campaign, or estimated from the tests if the estimates have a lower
-        chi-square.
+        Of values given and estimated, those with the lower chi-square are used.
 
         Args:
             effects: names of the model's effects.
@@ -185,7 +184,7 @@ class PreparedCampaign:
             Model with start values.
         """
         bushing, given_values, stage_fixed = self.campaign.bushing, self.given_values, stage_fixed or {}
-        fixed = {name: value for name, value in given_values.items() if not self.free((name,))}
+        fixed = {name: value for name, value in given_values.items() if not self.free_names((name,))}
         choices = [given_values] if fixed == given_values else [given_values, fixed]
         with error_location(self.campaign.path):
             starts = [start_values(bushing, data_sets, {**values, **stage_fixed}) for values in choices]
@@ -204,7 +203,7 @@ class PreparedCampaign:
         before = [name for name in (*BASE, *effects) if name in replaced or (name in effects and name not in added)]
         plain = Model.with_defaults(bushing, [*dict.fromkeys(before)], starts[best], constraints=self.constraints)
         names = [*models[best].parameters, *plain.parameters]
-        still = [name for name in names if not self.free((name,))]
+        still = [name for name in names if not self.free_names((name,))]
         return start_with_effects(models[best], plain, data_sets, still, self.bounds)
 
     def problem(self, model: Model, data_sets: Sequence[MeasuredTest], fixed: Collection[str] = ()) -> FitProblem:
@@ -215,10 +214,10 @@ class PreparedCampaign:
             data_sets: tests to fit.
             fixed: names of further parameters that this fit keeps fixed.
         """
-        names = [name for name in self.free(tuple(model.parameters)) if name not in (*fixed, *model.tied)]
+        names = [name for name in self.free_names(tuple(model.parameters)) if name not in (*fixed, *model.tied)]
         return FitProblem(model, data_sets, names, self.bounds)
 
-    def free(self, names: Sequence[str]) -> tuple[str, ...]:
+    def free_names(self, names: Sequence[str]) -> tuple[str, ...]:
         """Select the parameter names that the campaign does not fix."""
         settings = self.campaign.fit.parameters
         return tuple(name for name in names if name not in settings or settings[name].vary)

@@ -198,7 +198,7 @@ class FitResult:
         return dict(zip(self.data_sets, residual_slices(self.data_sets), strict=True))
 
     def row_span(self, tests: Sequence[MeasuredTest]) -> slice:
-        """Slice of `residual` from the first to the last residual of some of the tests."""
+        """Slice of `residual` from the first to the last residual of `tests`, which are neighbours in the fit."""
         slices = [self.residual_rows[test] for test in tests]
         return slice(min(rows.start for rows in slices), max(rows.stop for rows in slices))
 
@@ -208,7 +208,7 @@ class FitResult:
         return [name for name in self.model.values if name not in self.names]
 
     def stage(self, fixed: Collection[str] = ()) -> FitProblem:
-        """Problem of this fit for `covariance`, with the tests' weights; the parameters in `fixed` are not free."""
+        """Problem of this fit with the tests weighted as for the covariance, and parameters in `fixed` not free."""
         names = [name for name in self.names if name not in fixed]
         return replace(self.problem, tests=self.covariance_tests or self.problem.tests, names=names)
 
@@ -219,7 +219,7 @@ class FitResult:
 
     @property
     def mean_square(self) -> float:
-        """Mean square of the residuals of the tests, in squared units of noise."""
+        """Chi-square divided by the number of residuals (not by the degrees of freedom)."""
         return self.chi_square / max(sum(test.residual_count for test in self.data_sets), 1)
 
     @property
@@ -235,7 +235,7 @@ class FitResult:
 
     @property
     def at_minimum(self) -> bool:
-        """True if chi-square is minimal within chance: a further Gauss-Newton step would not lower it significantly."""
+        """True if a further Gauss-Newton step would lower chi-square by less than chance does (3.84 at 95 %)."""
         return self.expected_fall(self.at_bound) <= Z95**2 * max(self.chi_square / self.residual.size, 1.0)
 
     def expected_fall(self, fixed: Collection[str]) -> float:
@@ -246,7 +246,7 @@ class FitResult:
         return float(np.sum(np.square(left_vectors[:, significant].T @ self.residual)))
 
     def with_shared_error(self, error: SharedErrors) -> FitResult:
-        """Whiten the residuals and their derivatives by an error that the residuals of all tests share."""
+        """Return the result with residuals and derivatives whitened by an error that all tests share."""
         problem = replace(self.problem, shared_error=error)
         return replace(
             self, problem=problem, residual=error.whiten(self.residual), jacobian=error.whiten(self.jacobian)

@@ -32,7 +32,7 @@ from bushfit.fitting.preparation import MeasuredTest, sources, with_level_errors
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.problem import FitResult
 from bushfit.fitting.profile import find_limit, profile95
-from bushfit.fitting.robust import estimate, outlier_warnings
+from bushfit.fitting.robust import outlier_warnings, solve_problem
 from bushfit.geometry import get_places
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
@@ -98,11 +98,11 @@ def fit_joint(
     unused = [test for test in data.data_sets if test not in tests]
     # copies, so that what they compute for the fit is released with it
     problem = data.problem(data.starting_model(effects, tests), [replace(test) for test in tests])
-    found = estimate(problem, robust=data.robust)
+    found = solve_problem(problem, robust=data.robust)
 
     def refit(errors: LevelErrors) -> FitResult:
         with_errors = with_level_errors(tests, errors.error, errors.freedom)
-        return estimate(replace(problem, model=found.model, tests=with_errors), robust=data.robust)
+        return solve_problem(replace(problem, model=found.model, tests=with_errors), robust=data.robust)
 
     found, error, notes = with_excess_errors(found, data.bounds, data.campaign.rig, refit)
     result = build_result([found], data.bounds, unused=unused)
@@ -156,9 +156,9 @@ def fit_dynamic(data: PreparedCampaign, static: Result) -> Result:
     return _with_campaign(data, [found], result)
 
 
-def given_static(data: PreparedCampaign) -> Result | None:
-    """Static result with mu, sigma_fmax and eps_half fixed in the campaign's [fit]; None unless all are fixed."""
-    free = data.free(STATIC)
+def fixed_static_result(data: PreparedCampaign) -> Result | None:
+    """Result with the values of mu, sigma_fmax and eps_half that [fit] fixes, without tests; None unless all are."""
+    free = data.free_names(STATIC)
     fixed = {name: value for name, value in data.given_values.items() if name in STATIC and name not in free}
     if len(fixed) < len(STATIC):
         return None
@@ -240,7 +240,7 @@ def _springpot_warning(data: PreparedCampaign, static: FitResult) -> Caveat:
 def _fit_step(
     data: PreparedCampaign, tests: Sequence[MeasuredTest], fixed: Mapping[str, float], start: Model | None = None
 ) -> FitResult:
-    """Fit one step of the paper's procedure with lmfit.
+    """Fit one step, static or dynamic, of the paper's procedure with lmfit.
 
     Args:
         data: prepared campaign.
@@ -250,7 +250,7 @@ def _fit_step(
     """
     effects = BASE if fixed else ("elastic", "friction")
     model = start.with_values(fixed) if start else data.starting_model(effects, tests, fixed)
-    return estimate(data.problem(model, tests, fixed), robust=data.robust, lmfit=True)
+    return solve_problem(data.problem(model, tests, fixed), robust=data.robust, lmfit=True)
 
 
 def _with_campaign(
@@ -295,7 +295,7 @@ def build_result(
     unused: Sequence[MeasuredTest] = (),
     bounded_is_fixed: bool = False,
 ) -> Result:
-    """Build a result: the model of the last fit, with the uncertainty and the warnings of all fits.
+    """Build a result from one or more fits: the last model, with the covariance and the warnings of all fits.
 
     Args:
         steps: fits of a procedure, in order.

@@ -74,10 +74,10 @@ def find_limit(
     i, coordinates = list(best.names).index(name), Coordinates.of_parameters(best.model, [name])
     start, bound = best.coordinates.point(best.model.values)[i], best.problem.limits[end == "max"][i]
     fits = {start: best} if fits is None else fits
-    allowed = _ONE_SIDED * np.sqrt(excess(best)) if allowed is None else allowed
+    allowed = _ONE_SIDED * np.sqrt(misfit_factor(best)) if allowed is None else allowed
 
     def model_at(coordinate: float) -> Model:
-        """Model of the nearest fit, with the parameter at a coordinate of the fit, which is mostly its natural log."""
+        """Model of the nearest known fit, with the parameter at a coordinate, mostly its natural log."""
         value = np.clip(coordinates.values([coordinate])[name], *best.model.parameters[name].bounds)
         return fits[min(fits, key=lambda known: abs(known - coordinate))].model.with_values({name: float(value)})
 
@@ -136,7 +136,7 @@ def profile95(best: FitResult, covariance: Covariance) -> Mapping[str, Interval]
     # how far a model error, or a gain of a loop that the weights do not contain, bends parameters, no weight tells
     loops, _ = split_by_kind(best.problem.tests)
     missed = any(test.model_error for test in best.problem.tests) or not all(loop.gain_weighs for loop in loops)
-    widest = np.inf if missed else _WIDEST * Z95 * np.sqrt(excess(best))
+    widest = np.inf if missed else _WIDEST * Z95 * np.sqrt(misfit_factor(best))
     allowed = np.clip(half / best.coordinates.slopes(best.model.values) / linear, Z95, widest)
     found: dict[str, Interval] = {}
     for i, name in enumerate(track("profiles", names)):
@@ -146,6 +146,6 @@ def profile95(best: FitResult, covariance: Covariance) -> Mapping[str, Interval]
     return found
 
 
-def excess(best: FitResult) -> float:
-    """Factor on the allowed rise of chi-square for a model that misses its tests: reduced chi-square, at least 1."""
+def misfit_factor(best: FitResult) -> float:
+    """Reduced chi-square of a fit, at least 1: factor on the rise of chi-square that a 95 % interval allows."""
     return max(reduced_chi_square(best.model, best.problem.tests, len(best.names))[0], 1.0)

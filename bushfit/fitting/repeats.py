@@ -1,6 +1,6 @@
-"""Noise of one line of a sweep, from the differences of repeats, or about a smooth curve without repeats.
+"""Noise of one level of a sweep, from the differences of repeats, or about a smooth curve without repeats.
 
-A line is the set of points, repeats included, at one constant amplitude (frequency is stepped) or one constant
+A level is the set of points, repeats included, at one constant amplitude (frequency is stepped) or one constant
 frequency (amplitude is stepped). Errors are errors of ln K = ln|K| + i phase, so gain errors are real and phase errors
 imaginary, both relative to |K|.
 """
@@ -32,7 +32,7 @@ _SURFACE_DEGREES = (1, 3)
 FEWEST_STEPS = 3
 #: Fewest differences among which outliers are sought: the median of fewer is no reliable scale.
 FEWEST_SOUGHT = 6
-#: Probability by chance of the scatter of many lines at one step, below which the step is disturbed; small, as the
+#: Probability by chance of the scatter of many levels at one step, below which the step is disturbed; small, as the
 #: scatter at other steps is estimated from few points.
 _DISTURBED = 1e-9
 #: Distance of an outlier from the other points [robust standard deviations]: noise alone reaches it once in 1e9.
@@ -40,45 +40,47 @@ _OUTLIER = 6.0
 
 
 @dataclass(frozen=True)
-class LineNoise:
-    """Noise of one line of a sweep, estimated from its repeats, or about a smooth curve without repeats.
+class LevelNoise:
+    """Noise of one level of a sweep, estimated from its repeats, or about a smooth curve without repeats.
 
     Args:
-        scatter: relative deviations of gain and phase [rad] from point to point, (k, 2).
-        freedom: degrees of freedom of the sum of squares of `scatter`.
+        errors: random errors of gain (relative) and phase [rad], scaled so that the sum of their squares divided by
+            `freedom` is the variance of one point: differences of neighbouring points between two repeats, or
+            residuals about a smooth curve, (k, 2).
+        freedom: degrees of freedom of this sum of squares.
         shared: variances of the gain and phase errors shared by a run, estimated from each pair of repeats, (pairs, 2).
         shared_freedom: degrees of freedom of the mean of `shared`; 0 without repeats.
-        without_largest: noise of the line without its largest deviation; None with repeats or few points.
+        without_largest: noise of the level without its largest deviation; None with repeats or few points.
         steps: frequency [Hz] or amplitude [m or rad] of each deviation, (k,); empty without repeats.
-        squared_distances: squared distance of the point at each step from the smooth curve, in units of the robust
-            scatter; empty with repeats.
+        squared_distances: squared distance of the point at each step from the smooth curve, by step, in units of the
+            robust standard deviation; empty with repeats.
     """
 
-    scatter: Array
+    errors: Array
     freedom: float
     shared: Array
     shared_freedom: float = 0.0
-    without_largest: "LineNoise | None" = None
+    without_largest: "LevelNoise | None" = None
     steps: Array = field(default_factory=lambda: np.empty(0))
     squared_distances: Mapping[float, float] = field(default_factory=dict)
 
     @property
     def variance(self) -> Array:
-        """Variances from point to point of the relative deviations in |K| and of those in phase [rad^2], (2,)."""
-        return np.asarray(np.square(self.scatter).sum(axis=0) / max(self.freedom, 1))
+        """Variances of the random error of one point in relative |K| and in phase [rad^2], (2,)."""
+        return np.asarray(np.square(self.errors).sum(axis=0) / max(self.freedom, 1))
 
 
-def line_noise(sweep: Sweep, log_stiffness: Array, held_value: float, disturbed: Collection[float] = ()) -> LineNoise:
-    """Estimate the noise of a line of a sweep (its runs at one constant value), from repeats or about a smooth curve.
+def level_noise(sweep: Sweep, log_stiffness: Array, held_value: float, disturbed: Collection[float] = ()) -> LevelNoise:
+    """Estimate the noise of a level of a sweep (its runs at one constant value), from repeats or about a smooth curve.
 
     Args:
         sweep: measured sweep.
         log_stiffness: ln K of the sweep's points, complex (n,).
-        held_value: value held constant along the line: amplitude [m or rad], frequency [Hz] or number of the run.
+        held_value: value held constant along the level: amplitude [m or rad], frequency [Hz] or number of the run.
         disturbed: frequencies or amplitudes to leave out, see `disturbed_steps`.
 
     Returns:
-        Noise of the line.
+        Noise of the level.
     """
     chosen = (sweep.held_value == held_value) & ~np.isin(sweep.step, [*disturbed])
     steps, column = np.unique(sweep.step[chosen], return_inverse=True)
@@ -103,7 +105,7 @@ def line_noise(sweep: Sweep, log_stiffness: Array, held_value: float, disturbed:
         return _about_smooth_curve(steps, np.nanmean(table, axis=0))
     independent = 2.0 / numbers.size  # of each pair: m repeats have m (m - 1)/2 pairs, and m - 1 of them are free
     joined = np.concatenate(scatter), independent * freedom, np.array(shared), independent * len(scatter)
-    return LineNoise(*joined, steps=np.concatenate(between))
+    return LevelNoise(*joined, steps=np.concatenate(between))
 
 
 def difference_freedom(steps: int) -> float:
@@ -114,7 +116,8 @@ def difference_freedom(steps: int) -> float:
 def _is_typical(difference: Array, log_step: Array) -> Array:
     """Mask of the steps at which the difference of two repeats is not an outlier, (n,).
 
-    The limit of an outlier is constant, or grows along the run if the differences do, by Theil's (1950) median slope.
+    An outlier is more than six robust standard deviations from the median. The limit grows along the run if the
+    differences do, by Theil's (1950) median slope.
 
     Args:
         difference: difference of ln K between the repeats at each step, complex (n,).
@@ -133,10 +136,10 @@ def _is_typical(difference: Array, log_step: Array) -> Array:
     return usual & np.all((distance <= _OUTLIER * scale) | (scale == 0.0), axis=1)
 
 
-def _about_smooth_curve(steps: Array, log_stiffness: Array) -> LineNoise:
-    """Noise of a line without repeats: scatter of ln K about a smooth curve over ln(step).
+def _about_smooth_curve(steps: Array, log_stiffness: Array) -> LevelNoise:
+    """Noise of a level without repeats: residuals of ln K about a polynomial of degree 4 or less over ln(step).
 
-    If the line has one or two points, the scatter is assumed.
+    If the level has one or two points, the random error is assumed to be 0.5 %.
 
     Args:
         steps: stepped frequency [Hz] or amplitude [m or rad] of each point, (n,).
@@ -144,7 +147,7 @@ def _about_smooth_curve(steps: Array, log_stiffness: Array) -> LineNoise:
     """
     degree = min(_SMOOTH_DEGREE, steps.size - 2)
     if degree < 1:
-        return LineNoise(np.full((1, 2), ASSUMED[0]), 1, np.empty((0, 2)))
+        return LevelNoise(np.full((1, 2), ASSUMED[0]), 1, np.empty((0, 2)))
     values = _gain_and_phase(log_stiffness)
     basis = np.polynomial.legendre.legvander(to_unit_interval(np.log(steps)), degree)
     residual = np.abs(values - basis @ least_absolute(basis, values, FLOOR**2))
@@ -158,27 +161,29 @@ def _about_smooth_curve(steps: Array, log_stiffness: Array) -> LineNoise:
     squares = np.square(residual / np.maximum(MEDIAN_TO_SIGMA * usual, FLOOR)).sum(axis=1)
     squared = dict(zip(steps.tolist(), squares.tolist(), strict=True))
 
-    def of_points(chosen: Array) -> LineNoise:
+    def of_points(chosen: Array) -> LevelNoise:
         """Noise of the points of a mask, (n,), about the curve that is fitted to them by least squares."""
         scatter = _project_out(basis[chosen], values[chosen])
-        return LineNoise(scatter, len(scatter), np.empty((0, 2)))
+        return LevelNoise(scatter, len(scatter), np.empty((0, 2)))
 
     calmer = of_points(np.arange(steps.size) != worst)
     return replace(of_points(inliers), without_largest=calmer if calmer.freedom else None, squared_distances=squared)
 
 
-def disturbed_steps(lines: Iterable[LineNoise]) -> list[float]:
+def disturbed_steps(levels: Iterable[LevelNoise]) -> list[float]:
     """Find frequencies or amplitudes at which sweeps without repeats scatter far more than elsewhere (mains hum).
 
+    The sum of squares at a step must have a probability by chance below 1e-9.
+
     Args:
-        lines: noise of the lines (runs at one constant value) of all sweeps.
+        levels: noise of the levels (runs at one constant value) of all sweeps.
 
     Returns:
         Frequencies [Hz] or amplitudes [m or rad].
     """
     points: dict[float, list[float]] = defaultdict(list)
-    for line in lines:
-        for step, square in line.squared_distances.items():
+    for level in levels:
+        for step, square in level.squared_distances.items():
             points[step].append(square)
     repeated = [(step, squares) for step, squares in points.items() if len(squares) >= FEWEST_STEPS]
     return [step for step, squares in repeated if chdtrc(2 * len(squares), sum(squares)) < _DISTURBED]

@@ -52,10 +52,10 @@ def list_outliers(
     return tuple(entry for data_set, points in pairs for entry in data_set.outliers(points, model))
 
 
-def estimate(problem: FitProblem, *, robust: bool = False, lmfit: bool = False) -> FitResult:
+def solve_problem(problem: FitProblem, *, robust: bool = False, lmfit: bool = False) -> FitResult:
     """Solve a fit problem by least squares, or robustly by the loss soft_l1 without the outliers of sweeps.
 
-    soft_l1 minimises the sum of 2 C^2 (sqrt(1 + (z/C)^2) - 1) over the distances z of the points in units of noise.
+    soft_l1 minimises the sum of 2 C^2 (sqrt(1 + (z/C)^2) - 1), C = 2, over the distances z of points in units of noise.
     The covariance is that of least squares with all weights equal to the efficiency of this loss under normal noise.
     Outliers of loops already have weight 0, see `prepared_loop`.
 

@@ -46,7 +46,7 @@ class RowNoise:
 
     Args:
         filter: prediction-error filter b, (p + 1,): the sum of b_k times the k-th row before is white with variance 1.
-        starts: matrix that whitens the first p rows, which have no p rows before them, (p, p).
+        starts: matrix that whitens the first p rows, which lack p preceding rows, (p, p).
         error: standard errors of the log of the variance, and of b_k/b_0, as independent columns, (p + 1, p + 1); None
             if not estimated.
         observed_share: fraction of the variance of the whitened rows that is observed; the rest is an assumed minimum
@@ -131,7 +131,12 @@ class RowNoise:
 
 
 class _Autoregression(NamedTuple):
-    """An autoregressive model of order p: its polynomial, (p + 1,), and its correlations at lags 0 to p, (p + 1,)."""
+    """An autoregressive model of order p.
+
+    Args:
+        polynomial: coefficients 1, a_1, ..., a_p of the prediction-error filter, (p + 1,).
+        correlations: covariance of two rows at lags 0 to p, in the squared unit of the rows, (p + 1,).
+    """
 
     polynomial: Array
     correlations: Array
@@ -184,13 +189,13 @@ def noise_harmonics_of_single_cycle(number: Array) -> Array:
 
 
 def _periodogram(rows: Array) -> Array:
-    """Power of rows, (n,), at their n // 2 + 1 frequencies, at least as large as rounding errors."""
+    """Power of rows, (n,), at their n // 2 + 1 frequencies, in the squared unit of the rows, above rounding."""
     power = np.abs(np.fft.rfft(rows)) ** 2 / rows.size
     return np.maximum(power, np.finfo(float).eps * power.mean())  # of cycles that repeat exactly, rounding
 
 
 def _fit_autoregression(power: Array, waves: Array, used: Array) -> _Autoregression:
-    """Fit an autoregressive model to a periodogram, with the order of Schwarz's criterion.
+    """Fit an autoregressive model to a periodogram; its order, 0 to 8, minimises Schwarz's criterion.
 
     Args:
         power: periodogram at m frequencies, (m,).

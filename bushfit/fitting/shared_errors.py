@@ -17,7 +17,7 @@ _MANY_ENTRIES = 30_000
 
 @dataclass(frozen=True, eq=False)
 class SharedErrors:
-    """Independent errors that each change several residuals, such as the gain error of a run or of a loop.
+    """Independent errors that each change several of n residuals, such as the gain error of a run or of a loop.
 
     Args:
         directions: changes of the n residuals, in units of noise, due to r independent errors, as orthonormal columns,

@@ -72,7 +72,7 @@ def from_campaign(data: PreparedCampaign, rivals: Sequence[str] | None = None) -
     data = PreparedCampaign.from_campaign(replace(data.campaign, rig=with_rig_class(data.campaign.rig, noise)))
     data_sets = data.require_tests(data.data_sets, "there is nothing to fit", "add measured tests to the campaign")
     model = data.starting_model(data.effects, data_sets)
-    fixed = [name for name in model.parameters if name not in data.free(tuple(model.parameters))]
+    fixed = [name for name in model.parameters if name not in data.free_names(tuple(model.parameters))]
     source = f"the tests of {data.campaign.name}"
 
     def knowledge(fit: FitResult) -> Knowledge:

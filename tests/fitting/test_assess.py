@@ -92,7 +92,7 @@ def test_a_run_held_out_is_a_refit_without_it(levelled):
     errors = np.sqrt(np.diag(np.linalg.inv(best.jacobian @ best.jacobian.T)))
     for level in LEVELS:
         rows = np.flatnonzero(np.tile(sweep.amplitude == level, 2))
-        step = LeaveOut.from_fit(best.jacobian, best.residual).step(rows)
+        step = LeaveOut.from_fit(best.jacobian, best.residual).parameter_step(rows)
         rest = solve(FitProblem(best.model, [sweep.without(np.flatnonzero(sweep.amplitude == level))], FIVE))
         moved = best.coordinates.point(rest.model.values) - best.coordinates.point(best.model.values)
         np.testing.assert_allclose(step / errors, moved / errors, atol=0.5)

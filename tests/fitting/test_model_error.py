@@ -16,12 +16,12 @@ from tries import SEEDS, some
 from bushfit.campaign.campaign import Campaign
 from bushfit.errors import FitError
 from bushfit.fitting.assess import covariance
-from bushfit.fitting.discrepancy import SIZES, FittedTests, discrepancies
+from bushfit.fitting.discrepancy import SIZES, FittedTests, candidate_processes
 from bushfit.fitting.model_error import log_likelihood, with_model_error
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.problem import FitProblem, FitResult
 from bushfit.fitting.procedures import fit_joint
-from bushfit.fitting.robust import estimate
+from bushfit.fitting.robust import solve_problem
 from bushfit.gaussian_process import condition, matern
 from bushfit.geometry import Direction, Specimen, unit_strain
 from bushfit.model.file import from_document, to_document
@@ -217,7 +217,7 @@ def test_a_ripple_of_a_dense_sweep_bends_no_parameter(rig, paper_model, seed):
 def refitted(rig) -> FitResult:
     """The sweeps of a rubber that is not quite the model, fitted with a model error."""
     data = PreparedCampaign.from_campaign(replace(spoiled(rig(3, shared=True), waves(0.03, 3)), loops=()))
-    plain = estimate(FitProblem(data.starting_model(data.effects, data.sweeps), data.sweeps, FIVE, data.bounds))
+    plain = solve_problem(FitProblem(data.starting_model(data.effects, data.sweeps), data.sweeps, FIVE, data.bounds))
     return with_model_error(plain, data.bounds)[0]
 
 
@@ -225,7 +225,7 @@ def test_the_covariance_is_the_sandwich_of_noise_and_process(refitted):
     """In full, J^+ V J^+^T, V by one standard deviation of each independent source of error."""
     found = refitted
     (sweep,) = found.covariance_tests
-    model, random = found.model, sweep.noise.scatter(sweep.name, sweep.held_value, sweep.step)
+    model, random = found.model, sweep.noise.random_noise(sweep.name, sweep.held_value, sweep.step)
     run = np.unique(np.stack((sweep.held_value, sweep.repeat)), axis=1, return_inverse=True)[1]
     shared, by_level = (np.array(error)[:, None] for error in (sweep.noise.shared, sweep.noise.level))
     assert by_level.all(), "repeats do not reveal errors of levels"
@@ -246,7 +246,7 @@ def test_the_likelihood_is_averaged_over_the_process(refitted):
     (sweep,) = (replace(test, model_error=0.0) for test in refitted.problem.tests)
     solution, free = refitted.reevaluate(refitted.model, [sweep]), ["mu", "m"]
     cases, jacobian_rows = list[tuple[float, float]](), solution.jacobian
-    for process in discrepancies(FittedTests(solution)):
+    for process in candidate_processes(FittedTests(solution)):
         units = process.columns
         eigenvalues, vectors = np.linalg.eigh(units.T @ units)
         for size in SIZES:

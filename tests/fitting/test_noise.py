@@ -64,7 +64,7 @@ def test_scatter_grows_towards_low_frequency_where_repeats_show_it(noisy_sweep):
         clean, scattered = noisy_sweep(seed, 0.0), noisy_sweep(seed)
         error = np.log(scattered.stiffness / clean.stiffness) * (clean.frequency / 100.0) ** -0.6
         noise = sweep_noise([replace(clean, stiffness=clean.stiffness * np.exp(error))])
-        ends = noise.scatter("sweep", np.full(2, 1e-4), np.array([5.0, 155.0]))
+        ends = noise.random_noise("sweep", np.full(2, 1e-4), np.array([5.0, 155.0]))
         found.append(ends.mean(axis=0) / (5e-3 * (np.array([5.0, 155.0]) / 100.0) ** -0.6))
     np.testing.assert_allclose(np.mean(found, axis=0), 1.0, rtol=0.2)  # without growth they are 0.3 and 2.4
 

@@ -68,7 +68,7 @@ def test_whitening_gives_the_identity(sweep, monkeypatch, entries):
 def test_unsure_noise_moves_the_covariance_by_its_derivatives(sweep):
     """Of whitened residuals, by each variance times its standard error: scatter, what runs and what levels share."""
     level, freedom = (3e-3, 2e-3), {"scatter": 20, "shared": 6, "level": 5}
-    noise = replace(sweep.noise, level=level, scatter_freedom=20, level_freedom=5)
+    noise = replace(sweep.noise, level=level, random_freedom=20, level_freedom=5)
     data, n = replace(sweep, noise=noise), sweep.frequency.size
     whitening = data.whiten(np.concatenate([np.eye(n), 1j * np.eye(n)])).T
     influence = np.random.default_rng(1).normal(size=(3, 2 * n))
@@ -286,7 +286,7 @@ def recorded(model: Model, *motions: Array, noise: float = 3e-3) -> Loop:
 @pytest.mark.parametrize("case", RUN_INS)
 def test_the_true_model_leaves_only_noise_of_the_steady_cycles(paper_model, case):
     prepared = prepare_loop(recorded(paper_model, *RUN_INS[case]))
-    gap = float(np.sqrt(np.mean(np.square(prepared.relative(paper_model)))))
+    gap = float(np.sqrt(np.mean(np.square(prepared.relative_distance(paper_model)))))
     (note,) = prepared.notes
     assert "left out" in note.text
     assert prepared.frequency == pytest.approx(1.0 / PERIOD, rel=2e-3)

@@ -177,7 +177,7 @@ def _visible(plain: Model, model: Model, plan: SimulateSettings) -> float:
     """Largest misfit of a plain model fitted to what the model itself predicts, relative."""
     data_sets = _noise_free_data(model, plan)
     fitted = fit_model(plain, data_sets, (), {}).model
-    return max(data_set.change(fitted, model) for data_set in data_sets)
+    return max(data_set.largest_difference(fitted, model) for data_set in data_sets)
 
 
 def _noise_free_data(model: Model, plan: SimulateSettings) -> list[MeasuredTest]:
