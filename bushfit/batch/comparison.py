@@ -101,6 +101,8 @@ def _studentised_deviations(values: Array, errors: Array, usual: Array) -> Array
 def smallest_deviation(parts: int, quantities: int) -> float | None:
     """Smallest deviation, in standard deviations, that makes a part an outlier; None for fewer than five parts.
 
+    In 5 % of batches of equal parts, any part deviates as much in any quantity.
+
     Args:
         parts: number of parts in the batch.
         quantities: number of compared quantities.

@@ -107,7 +107,7 @@ class BatchResult:
 
     @cached_property
     def quantities(self) -> dict[str, PartQuantity]:
-        """Parameters, and stiffness and loss factor at stated points, by name: what is compared between the parts."""
+        """Quantities by name: parameters, measures of the fit, and stiffness and loss factor at the stated points."""
         return list_quantities(self.estimates, self.plan.task.points)
 
     @cached_property
@@ -158,7 +158,7 @@ class BatchResult:
 
     @cached_property
     def outliers(self) -> tuple[dict[str, Array], dict[str, Array]]:
-        """Deviations of the parts from the others in standard deviations, and True for outliers; by quantity, (n,)."""
+        """Deviation of each part from the others in standard deviations, and mask of outliers, by quantity, (n,)."""
         return find_outliers(self.compared_values)
 
     @cached_property
@@ -195,7 +195,7 @@ class BatchResult:
             headline=headline,
             **to_entries(self.warnings(parts)),
             detectable=smallest_deviation(count, len(self.compared_values)),
-            quantities={column.header: self.quantity_table(name, column) for name, column in columns.items()},
+            quantities={column.header: self.quantity_table(column) for column in columns.values()},
             curve_points=[*self.curves],
             parts=parts,
         )
@@ -206,17 +206,16 @@ class BatchResult:
         whole = replace(self.document, kept=self.kept_count, seconds=round(self.seconds, 3))
         return cast("Mapping[str, Any]", to_json_data(whole, BatchFile))
 
-    def quantity_table(self, name: str, column: PartQuantity) -> QuantityTable:
-        """Summarize one quantity over all parts: median, scatter, limits and capability.
+    def quantity_table(self, column: PartQuantity) -> QuantityTable:
+        """Summarize one quantity over all parts: median, scatter, limits of the limits file, and process capability.
 
         Args:
-            name: name of the quantity.
-            column: the quantity with the unit of its table column.
+            column: name of the quantity, with the unit of its column in the batch table.
 
         Returns:
             Entry of the quantity in `batch.json`, in the unit of the column.
         """
-        values = self.estimates[name][0] * column.factor
+        name, values = column.name, self.estimates[column.name][0] * column.factor
         is_known = np.isfinite(values)
         is_usable = is_known & ~(self.is_poor | self.lacks_sweep) if name not in FIT_NAMES else is_known
         known_values, detectable = values[is_usable if is_usable.any() else is_known], None

@@ -44,8 +44,9 @@ def contrast_table(comparison: Comparison, contrast: Contrast) -> pd.DataFrame:
         contrast: stiffness and loss factor of both results at the points of one direction or specimen.
 
     Returns:
-        A row per operating point: frequency, amplitude, then values and differences with the ends of their 95 % bands
-        ("..., low" and "..., high"), and "yes" or "no" for a significant difference ("..., significant").
+        A row per operating point: frequency [Hz] and amplitude; stiffness (or modulus) and loss factor of both results;
+        and their differences, other minus reference, relative for the stiffness. Each has columns for the ends of its
+        95 % band ("..., low" and "..., high"), a difference also "yes" or "no" in the column "..., significant".
     """
     (_, length), _, (_, factor) = contrast.place.display
     columns: list[Any] = [contrast.reference.frequency, contrast.reference.amplitude * length]
@@ -58,7 +59,7 @@ def contrast_table(comparison: Comparison, contrast: Contrast) -> pd.DataFrame:
 
 
 def contrast_headers(amplitude: str, stiffness: str) -> list[str]:
-    """Headers of the columns of `contrast_table`, from the headers of amplitude and stiffness (or modulus)."""
+    """Headers of `contrast_table`, from headers such as "amplitude [mm]" and "stiffness [N/mm]"."""
     ends = ("", ", low", ", high")
     sides = [f"{side} {name}" for side in ("reference", "other") for name in (stiffness, LOSS)]
     differences = (f"relative difference of {split_header(stiffness)[0]} [-]", f"difference of {LOSS}")
@@ -93,7 +94,7 @@ class PlaceDifferences:
 
     @classmethod
     def from_columns(cls, label: str, place: str, columns: Mapping[str, Sequence[Any]]) -> PlaceDifferences:
-        """Make the table, and find its headers; the quantity may be a stiffness or a modulus, in any unit.
+        """Make the differences from columns of compare.json; the quantity may be a stiffness or a modulus, in any unit.
 
         Args:
             label: letter of the result.
@@ -101,7 +102,7 @@ class PlaceDifferences:
             columns: columns of the table by header, in the order of `contrast_headers`.
 
         Returns:
-            Table and headers.
+            The differences, with their table and its headers.
 
         Raises:
             ModelError: a column is missing or empty, or columns have different lengths.
@@ -155,7 +156,7 @@ def read_comparison(document: Mapping[str, Any], file: Path | None = None) -> Co
 
 
 def place_differences(comparison: ComparisonFile) -> dict[str, list[PlaceDifferences]]:
-    """Differences of each result but the reference, by name of the direction or specimen.
+    """Differences in stiffness and loss factor from the reference: one per other result, by direction or specimen.
 
     Raises:
         ModelError: columns of a pair that do not go together.
@@ -193,7 +194,12 @@ def parameter_differences_table(comparison: ComparisonFile) -> pd.DataFrame:
 
 
 def differences_table(comparison: ComparisonFile) -> pd.DataFrame:
-    """Table of the differences of stiffness and loss factor, differences.csv: a row per pair and operating point."""
+    """Table of the differences of stiffness and loss factor, differences.csv: a row per pair and operating point.
+
+    Returns:
+        Letter of the other result, direction or specimen, and the columns of `contrast_table`: frequency, amplitude,
+        values of both results and their differences, with 95 % bands.
+    """
     by_result = zip(*place_differences(comparison).values(), strict=True)
     return pd.concat([one.table for of_result in by_result for one in of_result], ignore_index=True)
 
@@ -228,7 +234,9 @@ def family_cells(comparison: ComparisonFile) -> Iterator[list[str]]:
     """Rows of the table of model families (sets of effects, fitted to the same tests), as formatted texts.
 
     Returns:
-        An iterator over the families: texts of name, parameters, agreement, probability and held-out error.
+        An iterator over the families. Eight texts each: letter and name, number of parameters, NRMSE, reduced
+        chi-square, probability, rms residual [noise] of the held-out parts with this and with the first family, and
+        number of held-out parts, such as "3 of 4".
     """
     for family, entry in zip(comparison.families or (), comparison.compared, strict=False):
         parts = len(family.parts)

@@ -37,7 +37,7 @@ def permitted_use(document: DiagnosisFile) -> str:
 
 
 def gap_table(diagnosis: Diagnosis) -> pd.DataFrame:
-    """Table of the gap, measured minus model, before and after the effects that a diagnosis adds to the model.
+    """Table of the gap, measured minus model, with the model before and after a diagnosis adds effects to it.
 
     The gap is in units of noise and in percent: of |K| for sweeps, of half the force range for loops. Frequency and
     amplitude are listed as recorded, even if the diagnosis corrects a mistake in the record.
@@ -46,7 +46,9 @@ def gap_table(diagnosis: Diagnosis) -> pd.DataFrame:
         diagnosis: finished diagnosis with the models before and after.
 
     Returns:
-        A row per point of a sweep or row of a loop, with the measured response and the response of the final model.
+        A row per point of a sweep or row of a loop: test, kind ("sweep" or "loop"), direction, conditions, frequency
+        and amplitude; gap in columns such as "storage before [noise]", "loss after [%]" and, for loops, "force after
+        [%]"; then the measured response and the response of the final model.
     """
     before, after = diagnosis.before, diagnosis.after
     tables = []
@@ -77,8 +79,9 @@ def candidates_table(diagnosis: Diagnosis) -> pd.DataFrame:
     """Table of the results of a diagnosis for every effect that could explain the gap.
 
     Returns:
-        A row per effect: level (material, component, instrument, record), score, gain in chi-square, probability,
-        fitted parameters, and reason for accepting or rejecting the effect.
+        A row per effect: name, level (material, component, instrument, record), decrease of chi-square as expected from
+        the linearised model and as found in a refit (empty without one), probability that the effect is present, fitted
+        parameters with units as one text, and reason for accepting or rejecting the effect.
     """
     rows = [
         {

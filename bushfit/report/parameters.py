@@ -85,7 +85,7 @@ def effect_sizes(effect: EffectEntry) -> list[tuple[str, str, str]]:
     """Format the parameters of an effect that a diagnosis named.
 
     Returns:
-        Name, value with unit, and 95 % interval of each parameter.
+        Three texts per parameter: name, value with unit such as "1.2 MPa", and 95 % interval such as "1.1 to 1.3".
     """
     rows = []
     for name, size in effect["parameters"].items():

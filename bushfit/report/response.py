@@ -41,7 +41,7 @@ def validation_table(validations: Sequence[Validation]) -> pd.DataFrame:
     """Table of the agreement of predictions with validation records, one row per record.
 
     Args:
-        validations: comparisons with the model to use.
+        validations: validation records, compared with the force that the final model predicts.
 
     Returns:
         Name and direction of each record; NRMSE, relative differences of peak force and energy, share of the points
@@ -58,7 +58,7 @@ def record_table(validation: Validation) -> pd.DataFrame:
     return table.assign(**{f"measured {place.motion.words[1]} [{unit}]": factor * validation.measured})
 
 
-def response_figures(response: TimeResponse) -> dict[str, float | None]:
+def summarize_response(response: TimeResponse) -> dict[str, float | None]:
     """Summarise the response to a displacement history in numbers [SI].
 
     Returns:

@@ -220,7 +220,8 @@ def loops_table(model: Model, data_sets: Sequence[MeasuredLoop]) -> pd.DataFrame
         data_sets: measured loops.
 
     Returns:
-        A row per recorded row; of a long loop, a row per bin of phase.
+        A row per sample, or per bin of phase of a long loop: name, direction, time [s], frequency [Hz], displacement,
+        measured and modelled force (display units), residual [noise], and outlier ("yes" or "no").
     """
     tables = []
     for data_set in data_sets:
@@ -258,7 +259,9 @@ def sweeps_table(model: Model, data_sets: Sequence[MeasuredSweep]) -> pd.DataFra
         data_sets: measured sweeps.
 
     Returns:
-        A row per measured point, sorted by fixed quantity (amplitude or frequency), repeat and stepped quantity.
+        A row per measured point, sorted by fixed quantity (amplitude or frequency), repeat and stepped quantity: name,
+        direction, conditions, frequency, amplitude, repeat, measured and modelled stiffness and loss factor, residuals
+        of stiffness and loss [noise], their ratio and difference, and outlier ("yes" or "no").
     """
     tables = []
     for data_set in data_sets:
@@ -302,7 +305,7 @@ def condition_columns(conditions: RubberConditions, place: Place) -> dict[str, A
 
 
 def sweep_condition_columns(data_set: MeasuredSweep) -> dict[str, Any]:
-    """Columns of `sweeps_table` on the conditions of a sweep: stepped quantity, temperature, preload, part, error.
+    """Table columns on the conditions of a sweep: stepped quantity, temperature, preload, part and stated error.
 
     Returns:
         Values by column header: one value for the whole sweep, or one for each of its n points, (n,).

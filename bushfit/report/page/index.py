@@ -99,7 +99,7 @@ def index_page(batch: BatchFile, folder: Path, base: str = "") -> str:
 
 
 def summarize_warnings(named: Sequence[tuple[str, str]]) -> str:
-    """Summarise warnings of one kind: parts, and the warning of the first part.
+    """Summarise warnings of one kind in a text such as "3 parts, such as A7: ..." with the warning of the first part.
 
     Args:
         named: name of the part and text of each warning.

@@ -38,7 +38,7 @@ def tested_tables(tables: Mapping[str, pd.DataFrame]) -> dict[str, pd.DataFrame]
     columns, with a row for each point of a sweep and each row of a loop.
 
     Args:
-        tables: tables of a result by file name.
+        tables: tables of a result by file name without extension, such as "gap".
 
     Returns:
         The selected tables by file name, with `sweeps` and `loops` made from `gap` if they are missing.
@@ -57,15 +57,15 @@ def tested_tables(tables: Mapping[str, pd.DataFrame]) -> dict[str, pd.DataFrame]
 def predict_tables(
     result: Result, tables: Mapping[str, pd.DataFrame], sweeps: pd.DataFrame | None
 ) -> dict[str, Prediction]:
-    """Compute a prediction on the grid of each prediction table, by its file name; without tables, on the sweeps' grid.
+    """Compute a prediction for each direction or specimen, on the grid of its prediction table or else of its sweeps.
 
     Args:
         result: final model.
-        tables: tables of the result by file name.
+        tables: tables of the result by file name without extension; prediction tables are named by direction.
         sweeps: table of the measured sweeps; None without sweeps.
 
     Returns:
-        Predictions by file name.
+        Predictions by the file name of their table; none for a direction without table and sweeps.
     """
     places: list[Place] = [*(Direction if result.model.bushing else ()), *result.specimens]
     predictions = {}

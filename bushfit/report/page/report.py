@@ -138,8 +138,8 @@ def draw_figures(
     Args:
         result: final model.
         diagnosis: content of diagnosis.json; None without a diagnosis.
-        tables: tables from `tested_tables`.
-        predictions: predictions for directions and specimens by file name.
+        tables: tables of measured and modelled tests by file name: gap, sweeps, loops and validation_....
+        predictions: predictions for directions and specimens by the file name of their table, such as "axial".
         charts: figures made in the run, by file name; other figures are made from the tables.
 
     Returns:

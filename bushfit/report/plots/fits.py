@@ -43,7 +43,7 @@ def sweeps_figure(result: Result, table: pd.DataFrame, title: str) -> style.Char
 
     Args:
         result: fitted model, with the effects of the rig that the tests include.
-        table: table of sweeps from `tables.sweeps_table`.
+        table: measured and modelled sweeps, a row per point, with the columns of `tables.sweeps_table` (sweeps.csv).
         title: title of the figure.
 
     Returns:
@@ -148,7 +148,7 @@ def loops_figure(result: Result, table: pd.DataFrame, title: str) -> style.Chart
 
     Args:
         result: fitted model, with the effects of the rig.
-        table: table of loops from `tables.loops_table`.
+        table: measured and modelled loops, a row per sample, with the columns of `tables.loops_table` (loops.csv).
         title: title of the figure.
 
     Returns:

@@ -52,7 +52,7 @@ def gap_figure(table: pd.DataFrame, result: Result, diagnosis: Mapping[str, Any]
     and all loops of one direction or specimen share one y axis.
 
     Args:
-        table: table of the gap from `diagnosed.gap_table`.
+        table: gap of every sweep point and loop row, with the columns of `diagnosed.gap_table` (gap.csv).
         result: final model, which gives the specimens by their names.
         diagnosis: content of diagnosis.json.
         title: title of the figure.
@@ -105,7 +105,7 @@ def column_titles(table: pd.DataFrame, result: Result, diagnosis: Mapping[str, A
     """Titles of the columns of the figure, with the root mean square gap in units of noise.
 
     Args:
-        table: table of the gap from `diagnosed.gap_table`.
+        table: gap of every sweep point and loop row, with the columns of `diagnosed.gap_table` (gap.csv).
         result: final model.
         diagnosis: content of diagnosis.json.
 

@@ -184,7 +184,7 @@ def _draw_points(
         panels: panels of stiffness and of loss factor.
         quality: panels of standard errors and of harmonic distortion.
         reduction: operating points of the histories.
-        steps: table of the operating points.
+        steps: a row per operating point, with the attributes of `Step` as columns, such as "frequency" [Hz].
         looks: colour and marker by nominal amplitude [m, rad or 1].
     """
     unit, length = reduction.direction.display.displacement

@@ -71,7 +71,7 @@ class SweepGroup(NamedTuple):
 
 
 def header_of(place: Place, axis: Axis) -> str:
-    """Header of the table column of the quantity `axis`, frequency or amplitude, for a direction or specimen."""
+    """Header of the frequency or amplitude column (`axis`) in tables of a direction or specimen: "amplitude [mm]"."""
     return "frequency [Hz]" if axis == "frequency" else response_headers(place)[0]
 
 
@@ -118,7 +118,7 @@ def sweep_groups(table: pd.DataFrame, result: Result) -> list[SweepGroup]:
 
 
 def table_stiffness(rows: pd.DataFrame, place: Place, before: str = "") -> Array:
-    """Complex stiffness [SI] in the rows of a table of sweeps, (n,).
+    """Complex stiffness [N/m, N m/rad or Pa], measured or modelled, in n rows of a table of sweeps, (n,).
 
     Args:
         rows: rows of one direction or specimen.
@@ -131,9 +131,11 @@ def table_stiffness(rows: pd.DataFrame, place: Place, before: str = "") -> Array
 
 
 def rows_at_conditions(table: pd.DataFrame, prediction: Prediction) -> pd.DataFrame:
-    """Select the measured sweeps to draw with a prediction: of the same direction, preload and temperature.
+    """Select the measured sweep points to draw with a prediction: of the same direction, preload and temperature.
 
-    The table may lack preload and temperature. The temperature is ignored if the model does not depend on it.
+    Args:
+        table: measured sweeps, a row per point, with the columns of sweeps.csv; it may lack preload and temperature.
+        prediction: the prediction; its temperature is ignored if the model does not depend on it.
 
     Returns:
         The selected rows, with the name of the sweep in the column "test".

@@ -145,7 +145,8 @@ def draw_prediction(
         panels: left and right panel.
         prediction: prediction on a fine grid.
         rig: the same prediction with the effects of the rig; None if the model has no such effects.
-        table: measured sweeps of the same direction or specimen; None for no points.
+        table: measured sweeps of the same direction or specimen, a row per point, with the columns frequency,
+            amplitude, stiffness, loss factor and outlier of sweeps.csv; None for no points.
         axis: quantity along x.
         levels: fixed amplitudes [m, rad or 1] or frequencies [Hz], one for each line, ascending, (k,).
 
@@ -200,7 +201,7 @@ def points_near(table: pd.DataFrame | None, header: str, levels: Array) -> list[
         levels: predicted amplitudes or frequencies in the unit of that column, (k,).
 
     Returns:
-        Rows of the table at each predicted amplitude or frequency, empty if it was not measured, (k,).
+        A table for each of the k predicted amplitudes or frequencies, without rows if it was not measured.
     """
     if table is None:
         return [pd.DataFrame({"outlier": []})] * levels.size

@@ -60,7 +60,7 @@ def response_figure(title: str, table: pd.DataFrame, note: str = "") -> style.Ch
 
 
 def extreme_rows(values: Array, maximum: int) -> Array:
-    """Select rows of a long curve to draw: the lowest and the highest value of each of `maximum`/2 equal parts."""
+    """Indices of about `maximum` samples that show a long curve: minimum and maximum of each of `maximum`/2 parts."""
     if values.size <= maximum:
         return np.arange(values.size)
     edges = np.linspace(0, values.size, maximum // 2 + 1).astype(int)[:-1]

@@ -155,7 +155,11 @@ class Chart(Figure):
 
 
 class Style(NamedTuple):
-    """Colour, line style and marker of one curve (of an amplitude, frequency, temperature or loop) in a figure."""
+    """Look of one curve (of an amplitude, frequency, temperature or loop) in a figure.
+
+    Args:
+        color, dashes, marker: colour, line style and marker, as matplotlib takes them.
+    """
 
     color: Any
     dashes: Any
