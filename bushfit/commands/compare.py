@@ -152,7 +152,8 @@ def compare(
     others_compared = list(zip(labels[1:], comparisons, strict=True))
     words = [f"{label} against A, {line}" for label, comparison in others_compared for line in comparison.sentences()]
     advice = [family_to_use(fitted, results)] if fitted else []
-    advice += [f"{label}, {family.name}: {family.words}" for label, family in zip(labels[1:], fitted[1:], strict=False)]
+    sentences = [f"{family.name}: {family.sentence}" for family in fitted[1:]]
+    advice += [f"{label}, {sentence}" for label, sentence in zip(labels[1:], sentences, strict=False)]
     warnings = [*notes, *_warnings(labels, entries, comparisons, are_families=bool(fitted))]
     content = ComparisonFile(
         SCHEMA,
@@ -306,5 +307,5 @@ def _family(label: str, family: FittedFamily, result: Result) -> FamilyEntry:
         family.probability,
         [HeldOutPart(part.part, part.before, part.after) for part in held_out.parts],
         held_out.skipped,
-        family.words if label != "A" else "",
+        family.sentence if label != "A" else "",
     )

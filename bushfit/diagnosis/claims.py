@@ -180,7 +180,7 @@ def claims(data: PreparedCampaign, without: Collection[str]) -> list[Claim]:
 
 @dataclass(frozen=True, eq=False)
 class ClaimScreening:
-    """Selection of the mistakes to be fitted, by the misfit of the paper's model to the corrected tests.
+    """Screening of recording mistakes by the misfit of the paper's five-parameter model to the corrected tests.
 
     Args:
         data: the campaign as it was read.
@@ -194,7 +194,7 @@ class ClaimScreening:
     _products: dict[tuple[int, str, Bushing | None], Array] = field(default_factory=dict)
 
     def best(self, candidates: Sequence[Claim], limit: int) -> list[Claim]:
-        """Select the recording mistakes worth a refit: those whose correction may lower the misfit, the best first.
+        """Select the recording mistakes whose correction lowers the misfit of a coarse fit most, the best first.
 
         A correction that leaves the misfit as it is, such as one common factor of all stiffnesses, is not selected, nor
         is one that another correction of the same tests surpasses.
@@ -244,7 +244,7 @@ class ClaimScreening:
     def _test_products(
         self, index: int, data_set: MeasuredTest, mistake: Mistake | None, bushing: Bushing | None
     ) -> Array:
-        """Normal equations of one test: inner products of stiffness per unit of mu, m and sigma_fmax, and as measured.
+        """Normal equations of one test: inner products of the stiffness per unit of mu, m and sigma_fmax, and measured.
 
         Args:
             index: index of the test, loops before sweeps.

@@ -38,14 +38,14 @@ _EVALUATIONS = 400
 
 @dataclass(frozen=True, eq=False)
 class GapDescription:
-    """Description of a gap between model and tests that no known effect explains, by a smooth correction of |K|.
+    """Gap between model and tests that no known effect explains, described by a smooth correction of the stiffness.
 
     Args:
         after: model with its smooth correction of the stiffness, and the tests with loops replaced by their first
             harmonic.
         fitted: fit of the parameters with the correction treated as a random error of the model.
         holdout: root mean square residuals of held-out runs inside the tested range, without and with the correction.
-        description: nearest power law of frequency and amplitude; None if the tests show no power law.
+        description: power law of frequency and amplitude nearest to the correction; None if the tests show none.
         sentence: text on the size and the form of the gap, for the summary.
         evidence: text on the range of tests in which the correction is valid.
     """
@@ -58,7 +58,7 @@ class GapDescription:
     evidence: str
 
 
-def describe(
+def describe_gap(
     fit: FitResult,
     rig: RigSettings,
     start: Mapping[str, float],
@@ -115,7 +115,7 @@ def describe(
     model = replace(fitted.model, effects=(*fit.model.effects, NAME), unnamed=correction)
     after, whole = plain.reevaluate(model, harmonic), plain.reevaluate(model, fit.data_sets)
     holdout = beside_effects if before is None else _hold_out_inside(before, closest, correction)
-    return GapDescription(after, fitted, holdout, description, sentence, _validity(correction, whole))
+    return GapDescription(after, fitted, holdout, description, sentence, _validity_sentence(correction, whole))
 
 
 def _hold_out_inside(before: FitResult, closest: FitResult, correction: Unnamed) -> HoldOut:
@@ -165,7 +165,7 @@ def _hold_out_inside(before: FitResult, closest: FitResult, correction: Unnamed)
     return HoldOut.from_residuals(residuals)
 
 
-def _validity(correction: Unnamed, whole: FitResult) -> str:
+def _validity_sentence(correction: Unnamed, whole: FitResult) -> str:
     """Sentence with the range of frequency and amplitude of the correction, and the misfit of the worst loop."""
 
     def span(values: Sequence[float], factor: float = 1.0) -> str:
@@ -183,31 +183,32 @@ def _validity(correction: Unnamed, whole: FitResult) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Closing:
-    """Fitted model that closes the gap between model and tests as far as possible.
+    """Fits that reduce the misfit of a diagnosed campaign: with the effects found, then with a smooth correction.
 
     Args:
-        certain: fit of the starting model with the effects that are certain.
-        known: covariance of the amounts of effects that the fit kept fixed; None without any.
-        gap: smooth correction of the model for the rest of the gap, with its description; None without a correction.
-        holdout: residuals of held-out tests, if they were needed to decide on a correction; else None.
+        effects_fit: fit of the starting model with the effects whose probability is 97 % or more, if any.
+        fixed_amounts: covariance of those effects' parameters that this fit kept fixed; None if all were fitted.
+        gap: smooth correction of the stiffness for the rest of the misfit; None without a correction.
+        holdout: root mean square residuals of held-out tests, if they were compared with and without the effects.
     """
 
-    certain: FitResult
-    known: Covariance | None = None
+    effects_fit: FitResult
+    fixed_amounts: Covariance | None = None
     gap: GapDescription | None = None
     holdout: HoldOut | None = None
 
     @property
-    def fit(self) -> FitResult:
-        """Model that closes the gap: with the certain effects, and with the smooth correction if there is one."""
-        return self.gap.after if self.gap else self.certain
+    def final_fit(self) -> FitResult:
+        """Fit of the model to report: with the smooth correction if there is one, else with the effects alone."""
+        return self.gap.after if self.gap else self.effects_fit
 
 
 def close_gap(search: Search, finding: Finding, hypotheses: Sequence[Hypothesis], base: FitResult) -> Closing:
-    """Fit the effects that are certain, and correct the model for the rest of the gap by a smooth function.
+    """Fit the effects with a probability of 97 % or more, and correct the stiffness for the rest of the misfit.
 
-    The model is not corrected if the effects close the gap, or if tests may be faulty or wrongly recorded. The amounts
-    of effects may then be distorted, so held-out tests are predicted with and without them.
+    The correction is a smooth function of frequency and strain. It is left out if the effects explain the misfit, or if
+    tests may be faulty or wrongly recorded. The amounts of effects may then be distorted, so held-out tests are
+    predicted with and without them.
 
     Args:
         search: completed search, with the tests.
@@ -227,7 +228,7 @@ def close_gap(search: Search, finding: Finding, hypotheses: Sequence[Hypothesis]
     fit, gap = base if certain is search.base else with_free_gains(certain, data), None
     if search.settings.max_effects and verdict not in ("named", "unexplained") and not may_be_wrong.get(verdict):
         rig, has_candidates = data.campaign.rig, verdict == "ambiguous"
-        gap = describe(fit, rig, search.start, data.bounds, before=base, has_candidates=has_candidates)
+        gap = describe_gap(fit, rig, search.start, data.bounds, before=base, has_candidates=has_candidates)
     is_compared = verdict == "named" or (verdict == "ambiguous" and finding.names and not gap)
     return Closing(fit, amounts, gap, hold_out(base, fit, data.bounds) if is_compared else None)
 
@@ -235,7 +236,7 @@ def close_gap(search: Search, finding: Finding, hypotheses: Sequence[Hypothesis]
 def _fit_certain(
     search: Search, finding: Finding, hypotheses: Sequence[Hypothesis]
 ) -> tuple[FitResult, Covariance | None]:
-    """Fit the starting model with the effects of a finding that are certain.
+    """Fit the starting model with the effects of a finding that are certain (a probability of 97 % or more).
 
     If the first explanation also contains a smooth deviation of the rubber, the amounts of the effects are fixed at
     their posterior means, because a fit without the deviation would distort them.

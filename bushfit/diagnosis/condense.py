@@ -83,7 +83,7 @@ def shorten_tests(data: PreparedCampaign) -> tuple[PreparedCampaign, tuple[Cavea
 
 
 def _select_loops(loops: Sequence[MeasuredLoop]) -> Sequence[MeasuredLoop]:
-    """Select loops with at most `_MOST_ROWS` rows in total, but at least one loop of each direction.
+    """Select loops up to a total number of rows, but at least one loop of each direction.
 
     Loops that differ most in direction, amplitude and frequency are selected first, repeats of a loop last.
     """
@@ -104,7 +104,7 @@ def _select_loops(loops: Sequence[MeasuredLoop]) -> Sequence[MeasuredLoop]:
 
 
 def _new_noise(before: SweepNoise, shortened: Sequence[_ShortSweep], rig: RigSettings) -> SweepNoise:
-    """Noise of the sweeps after some were shortened; a stated noise falls with the number of points per mean.
+    """Noise of sweeps after some were shortened; the random noise falls with the number of points per mean.
 
     Args:
         before: noise of the sweeps as measured.

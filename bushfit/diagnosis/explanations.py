@@ -11,11 +11,11 @@ _UNSEEN = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class Group:
-    """Changes of the residuals that one explanation of a gap would cause: c columns, each with an unknown amount.
+class Signature:
+    """Signature of an explanation: the changes of the residuals that it would cause, per unit of unknown amounts.
 
     Args:
-        columns: change of the n whitened residuals per unit amount of each column, (c, n).
+        columns: change of the n whitened residuals per unit of each of c amounts (coefficients), (c, n).
         unit: relative change of |K| per unit amount of each column, (c,); if `act_together`, the complex relative
             change of the stiffness at p operating points, (c, p).
         act_together: True if all columns act at once, with independent amounts of the same prior standard deviation;
@@ -48,7 +48,7 @@ class Group:
 
     @property
     def scaled(self) -> Array:
-        """Changes of the residuals in `rows` by each of the c columns, scaled so that one prior suits all amounts.
+        """Changes of the residuals in `rows` by each column, scaled so that one prior suits all amounts, (c, rows).
 
         If only one of the columns acts, each is divided by its relative change of |K|: an amount of 1 then changes |K|
         by 100 %. A column that does not change |K| becomes zero. Columns that act together are not scaled.
@@ -69,11 +69,11 @@ class Explanation:
         family: name common to explanations that share one prior probability: an effect (whatever its direction), or a
             kind of faulty part.
         name: name of the explanation.
-        group: changes of the residuals that the explanation would cause; None for an effect that replaces a branch of
-            the model and therefore needs a refit.
+        signature: changes of the residuals that the explanation would cause; None for an effect that replaces a branch
+            of the model and therefore needs a refit.
     """
 
     kind: str
     family: str
     name: str
-    group: Group | None
+    signature: Signature | None

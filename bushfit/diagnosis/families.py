@@ -43,7 +43,7 @@ _BEYOND_LINEAR = 1.75
 
 @dataclass(frozen=True, eq=False)
 class FittedFamily:
-    """Model family fitted to a campaign, and compared with the first family: the campaign's model.
+    """Model family (set of effects) fitted to a campaign, and compared with the first family: the campaign's model.
 
     Args:
         name: effects that the family adds or puts in place of branches, joined by +; for the first family, "paper" and
@@ -74,7 +74,7 @@ class FittedFamily:
         return self.fit.chi_square + len(self.fit.names) * float(np.log(independent))
 
     @property
-    def words(self) -> str:
+    def sentence(self) -> str:
         """Sentence that compares the root mean square held-out residual of the family with that of the first family."""
         if self.gain is None or self.p is None or self.holdout.before is None or self.holdout.after is None:
             return "no part of the tests can be held out of both fits"
@@ -111,7 +111,7 @@ def known_families(model: Model, data_sets: Sequence[MeasuredTest]) -> tuple[str
 
 
 def _can_add(model: Model, name: str) -> bool:
-    """True if a model has the branch that the named effect would replace, or if the effect replaces none."""
+    """True if the effect `name` can be added to a model: it replaces no branch, or one that the model has."""
     return name not in model.effects and get_effect(name).replaces in (None, *model.effects)
 
 
@@ -145,7 +145,7 @@ def fit_families(
     requested = names or known_families(model, data_sets)
     for name in track("families fitted", requested):
         with nullcontext() if names else suppress(FitError):
-            chains[name] = _chain(chains, first, name, fixed, bounds)
+            chains[name] = _fit_in_turn(chains, first, name, fixed, bounds)
     effects = {name: [] if name == base_name else name.split("+") for name in chains}
     worth = {name: _log_evidence(chain, effects[name], bounds) for name, chain in chains.items()}
     probability = dict(zip(worth, softmax([*worth.values()]).tolist(), strict=True))
@@ -155,15 +155,15 @@ def fit_families(
     for name in track("families held out", [name for name in worth if name in reported]):
         predictions, skipped = predicted_parts(first, chains[name][-1], bounds)
         out = HoldOut.from_residuals({part: prediction.residuals for part, prediction in predictions.items()}, skipped)
-        gain = _gain(predictions, data_sets) if name != base_name else (None, None)
+        gain = _held_out_gain(predictions, data_sets) if name != base_name else (None, None)
         found.append(FittedFamily(name, chains[name][-1], out, *gain, worth[name], probability[name]))
     return found, {name: share for name, share in probability.items() if name not in reported}
 
 
-def _chain(
+def _fit_in_turn(
     chains: Mapping[str, list[FitResult]], first: FitResult, name: str, fixed: Sequence[str], bounds: Bounds
 ) -> list[FitResult]:
-    """Fit a model family effect by effect; the fits of the family without its last effect are reused.
+    """Fit a model family by adding its effects one after another; fits of the family without the last are reused.
 
     Args:
         chains: fits of the families so far, by name: without added effects, with one, with two, and so on.
@@ -176,7 +176,7 @@ def _chain(
         Fits with no effect added, one effect, two effects, and so on.
     """
     before, _, last = name.rpartition("+")
-    chain = [first] if not before else chains.get(before) or _chain(chains, first, before, fixed, bounds)
+    chain = [first] if not before else chains.get(before) or _fit_in_turn(chains, first, before, fixed, bounds)
     effect, present = get_effect(last), chain[-1].model.effects
     if not _can_add(chain[-1].model, last):
         has = "the model has this effect already"
@@ -201,10 +201,10 @@ def _log_evidence(chain: Sequence[FitResult], names: Sequence[str], bounds: Boun
     return sum(density for density, *_ in priors) + log_likelihood(found, precisions)
 
 
-def _gain(
+def _held_out_gain(
     predictions: Mapping[str, Predicted], data_sets: Sequence[MeasuredTest]
 ) -> tuple[tuple[float, float, float] | None, float | None]:
-    """Compute by how much a family's mean square held-out residual is smaller than that of the first family.
+    """Reduction of the mean square held-out residual by a family against the first family, with interval and p-value.
 
     Args:
         predictions: residuals of each held-out part by both families, by name of the part.

@@ -17,7 +17,7 @@ from typing import Literal
 import numpy as np
 from scipy.special import bdtrc
 
-from bushfit.diagnosis.explanations import Explanation, Group
+from bushfit.diagnosis.explanations import Explanation, Signature
 from bushfit.diagnosis.record import MisfitRegion
 from bushfit.effects.contract import Array
 from bushfit.fitting.measured_test import shown_amplitude
@@ -71,8 +71,8 @@ class FaultyPart(Explanation):
     @property
     def columns(self) -> Array:
         """Changes of all n whitened residuals per unit of c errors (gain, phase [rad] and their slopes), (c, n)."""
-        assert self.group is not None
-        return self.group.whole
+        assert self.signature is not None
+        return self.signature.whole
 
     @property
     def forms(self) -> tuple[Form, ...]:
@@ -81,22 +81,22 @@ class FaultyPart(Explanation):
         return by_family.get(self.family, ("shift", "gain", "points"))
 
     def in_form(self, form: Form) -> FaultyPart:
-        """Return this part with errors of another form in place of the common shift.
+        """Return this part with errors of another form: a common gain error, or one error for each point.
 
         Args:
-            form: errors of the points; "points" gives one column for each residual of the part's points.
+            form: "shift", a common gain and phase error, "gain", or "points", one column for each residual.
         """
-        assert self.group is not None
-        group = self.group
+        assert self.signature is not None
+        signature = self.signature
         if form == "gain":
-            group = replace(group, columns=group.columns[:1], unit=group.unit[:1])
+            signature = replace(signature, columns=signature.columns[:1], unit=signature.unit[:1])
         elif form == "points":
-            size = np.abs(group.columns).max(axis=0)
+            size = np.abs(signature.columns).max(axis=0)
             rows = np.flatnonzero(size)
             columns = np.zeros((rows.size, size.size))
             columns[np.arange(rows.size), rows] = size[rows]
-            group = replace(group, columns=columns, unit=np.eye(len(columns)))
-        return replace(self, group=group, form=form)
+            signature = replace(signature, columns=columns, unit=np.eye(len(columns)))
+        return replace(self, signature=signature, form=form)
 
     def region(self, residual: Array, change: float) -> MisfitRegion:
         """Describe this faulty part as a region in which tests and model disagree, for the report.
@@ -223,7 +223,7 @@ def find_faulty_parts(fit: FitResult) -> list[FaultyPart]:
     loops, sweeps = split_by_kind(fit.data_sets)
     faulty_parts = [*_frequencies(fit, sweeps), *_levels(fit, sweeps), *_repeats(fit, sweeps)]
     for loop in loops if sweeps else ():  # wrong as a whole, in gain or offset
-        group = Group(
+        signature = Signature(
             np.array(loop.gain_and_offset()),
             np.eye(2),
             act_together=True,
@@ -237,7 +237,7 @@ def find_faulty_parts(fit: FitResult) -> list[FaultyPart]:
             if test is not loop and test.direction == loop.direction
         )
         ends, name = ((frequency,) * 2, (amplitude,) * 2), f"the loop {loop.name}"
-        part = FaultyPart("part", "loop", name, group, loop.direction, *ends, may_be_physics=not is_covered)
+        part = FaultyPart("part", "loop", name, signature, loop.direction, *ends, may_be_physics=not is_covered)
         faulty_parts.append(part)
     return faulty_parts
 
@@ -312,7 +312,7 @@ def _frequencies(fit: FitResult, sweeps: Sequence[MeasuredSweep]) -> Iterator[Fa
 
 
 def _scopes(sweeps: Sequence[MeasuredSweep]) -> Iterator[tuple[str, str, Sequence[MeasuredSweep]]]:
-    """Generate the groups of sweeps that may have a common fault: each sweep, all of a direction, and all sweeps.
+    """Generate the signatures of sweeps that may have a common fault: each sweep, all of a direction, and all sweeps.
 
     Yields:
         Text on the location, such as a direction; text on the sweeps; and the sweeps.
@@ -321,7 +321,7 @@ def _scopes(sweeps: Sequence[MeasuredSweep]) -> Iterator[tuple[str, str, Sequenc
     def direction_of(sweep: MeasuredSweep) -> str:
         return str(sweep.direction)
 
-    by_direction = [(name, list(group)) for name, group in groupby(sorted(sweeps, key=direction_of), direction_of)]
+    by_direction = [(name, list(members)) for name, members in groupby(sorted(sweeps, key=direction_of), direction_of)]
     for name, members in by_direction:
         several = len(members) > 1
         for sweep in members:
@@ -360,14 +360,14 @@ def _common_fault(
         for axis in ("frequency", "amplitude")
     )
     ends = (float(frequency.min()), float(frequency.max())), (float(amplitude.min()), float(amplitude.max()))
-    group = Group(columns, unit, act_together=True, covered_rows=(fit.row_span(sweeps), fit.residual.size))
-    return FaultyPart("part", family, name, group, sweeps[0].direction, *ends)
+    signature = Signature(columns, unit, act_together=True, covered_rows=(fit.row_span(sweeps), fit.residual.size))
+    return FaultyPart("part", family, name, signature, sweeps[0].direction, *ends)
 
 
 def _shift_columns(
     fit: FitResult, sweeps: Sequence[MeasuredSweep], chosen: Sequence[Array], sloping: bool = False
 ) -> Array:
-    """Change of the whitened residuals of sweeps due to a gain error of 100 % and a phase error of 1 rad.
+    """Changes of the whitened residuals of sweeps due to a gain error of 100 % and a phase error of 1 rad.
 
     Args:
         fit: the fitted model and the tests.

@@ -91,7 +91,7 @@ def start_rivals(
 
 
 def fit_rivals(starts: Mapping[str, Descent], columns: Array | None = None) -> dict[str, FitResult]:
-    """Fit several models with proposed effects side by side, and abandon those that fall far behind the best.
+    """Fit several models with proposed effects one step each in turn, and abandon those far behind the best.
 
     Args:
         starts: fits before their first step, by the name of the effect, from `start_rivals`.

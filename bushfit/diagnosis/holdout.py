@@ -51,7 +51,7 @@ class HoldOutPart:
 
     @classmethod
     def of_tests(cls, name: str, chosen: Mapping[MeasuredTest, Array], tests: Sequence[MeasuredTest]) -> HoldOutPart:
-        """Build a part of all tests.
+        """Build a part from the held-out points of some tests.
 
         Args:
             name: name of the part.
@@ -175,7 +175,7 @@ def predicted_parts(before: FitResult, after: FitResult, bounds: Bounds) -> tupl
 
 
 def _rms_values(pair: Array) -> tuple[float, float]:
-    """Root mean square of the residuals of two models, (2, n)."""
+    """Root mean square of n residuals, for each of two models, from the residuals of both, (2, n)."""
     before, after = np.sqrt(np.mean(np.square(pair), axis=-1)).tolist()
     return before, after
 

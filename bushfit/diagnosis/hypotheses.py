@@ -9,15 +9,15 @@ from functools import cached_property
 import numpy as np
 
 from bushfit.diagnosis.claims import Claim
+from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.explanations import Explanation
 from bushfit.diagnosis.faulty_parts import FaultyPart, OutlierCluster
-from bushfit.diagnosis.group_evidence import GroupEvidence
 from bushfit.diagnosis.laplace import laplace
 from bushfit.diagnosis.linear_model import LinearModel
 from bushfit.diagnosis.priors import LEVELS
-from bushfit.diagnosis.projected_columns import CompoundDeviation, GroupSet
+from bushfit.diagnosis.projected_columns import CompoundDeviation, SignatureSet
 from bushfit.diagnosis.recorded_tests import ExplanationColumns, RecordedTests
-from bushfit.diagnosis.smooth_deviations import COMPOUND, compound, fast_relaxation
+from bushfit.diagnosis.smooth_deviations import COMPOUND, compound_signature, fast_relaxation
 from bushfit.effects import get_effect, get_parameter, qualified_name
 from bushfit.effects.contract import Array
 from bushfit.fitting.problem import FitResult
@@ -35,7 +35,7 @@ class Hypothesis:
     """One set of explanations of the gap between model and tests, with its posterior probability.
 
     Args:
-        state: step of the search (fitted model) that has exactly these explanations, or all but the last.
+        state: fitted model of the search that has exactly these explanations, or all but the last.
         log_posterior: natural log of prior times evidence, not normalised.
         change: largest relative change of |K| by any of the explanations.
         last: explanation that is not fitted in `state` and whose evidence is from the linearised model; None if all are
@@ -57,7 +57,7 @@ class Hypothesis:
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """Names of the effects, in the order in which they were added."""
+        """Names of the effects that the hypothesis adds to the model, in the order of the search."""
         return (*self.state.effects, *([] if self.refitted or not self.last else [self.last.name]))
 
     @property
@@ -73,7 +73,7 @@ class Hypothesis:
 
     @property
     def unnamed(self) -> str:
-        """Name of the smooth curve, or smooth deviation of the rubber, for an unknown effect; "" without one."""
+        """Name of the smooth curve, or of the rubber's smooth deviation, for an unknown effect; "" without one."""
         is_curve = self.last is not None and self.last.kind == "unnamed"
         return self.last.name if is_curve and self.last else COMPOUND * self.compound_deviates
 
@@ -91,9 +91,9 @@ class Hypothesis:
     @cached_property
     def p_value(self) -> float:
         """Posterior predictive p-value: probability of a larger chi-square than measured if the hypothesis is true."""
-        linear, group = self.state.linear, self.last.group if self.last else None
-        if group and self.last_change:
-            rows = replace(group, columns=group.scaled).whole
+        linear, signature = self.state.linear, self.last.signature if self.last else None
+        if signature and self.last_change:
+            rows = replace(signature, columns=signature.scaled).whole
             precision = np.full(len(rows), self.last_change**-2)
             linear = replace(
                 linear,
@@ -113,7 +113,7 @@ class SearchState:
         tests: tests with their record, as read or corrected.
         fit: fit of the model with the added effects; errors of faulty tests and of a deviating rubber may be fitted,
             too.
-        bare: this fit with residuals in units of the scatter from point to point, without errors that points share.
+        bare: this fit with residuals divided by the random noise alone, not whitened by errors that points share.
         log_prior: natural log of the prior probability of the set of explanations, and of the prior density of the
             effects' coordinates with the factor of Laplace's method.
         effects: names of the effects that were added.
@@ -163,7 +163,7 @@ class SearchState:
 
     @cached_property
     def plain(self) -> FitResult:
-        """The fit with residuals in units of noise, without errors of faulty tests and of a deviating rubber."""
+        """The fit with residuals whitened by noise alone, not by errors of faulty tests and of a deviating rubber."""
         return self.fit.reevaluate(self.fit.model, self.fit.data_sets) if self.fit.problem.shared_error else self.fit
 
     @cached_property
@@ -174,7 +174,7 @@ class SearchState:
 
     @cached_property
     def has_influence(self) -> Array:
-        """Mask of the fit's parameters that change the predicted tests and are not at an end of their range, (k,).
+        """Mask of the k fitted parameters that change the predicted tests and are not at an end of their range, (k,).
 
         A parameter has no influence if an effect replaces the branch of the model in which it acts.
         """
@@ -193,7 +193,7 @@ class SearchState:
 
     @cached_property
     def columns(self) -> ExplanationColumns:
-        """Columns of the residuals for further explanations, given the scatter of the faulty parts in this state."""
+        """Residual changes by further explanations, beside the errors of the faulty parts in this state."""
         scattered = [part.amount * part.columns for part in self.faulty_parts if part.form == "points"]
         variances = [np.square(columns).sum(axis=0) for columns in scattered]
         return self.tests.columns.with_variance(np.sum(variances, axis=0)) if variances else self.tests.columns
@@ -227,7 +227,7 @@ class SearchState:
         return bent.likeliest if bent and bent.log_evidence > plain.log_evidence else 0.0
 
     def free_columns(self, deviation: float) -> Array | None:
-        """Changes of the residuals due to faulty tests and a deviating rubber, to be fitted together with effects.
+        """Changes of the residuals due to faulty tests and a deviating rubber, to be fitted beside an effect.
 
         Without these columns an effect would be fitted to the faults.
 
@@ -254,33 +254,34 @@ class SearchState:
         """
         bare, values, rig = self.bare, self.bare.model.values, self.columns.errors
         rig = replace(rig, cases=[rig.cases[n] for n in self._likely_cases])
-        group = compound(bare, MAXIMUM_NODES)
-        linear = replace(self.linear, rig=rig, compound=CompoundDeviation(group, rig) if group else None)
+        signature = compound_signature(bare, MAXIMUM_NODES)
+        linear = replace(self.linear, rig=rig, compound=CompoundDeviation(signature, rig) if signature else None)
         moves = self.has_influence
         slopes, count = bare.coordinates.slopes(values)[moves], np.count_nonzero(moves)
         names = tuple(np.array(bare.names)[moves].tolist())
-        mean, covariance = linear.parameters(fast_relaxation(bare))
+        mean, covariance = linear.posterior_parameters(fast_relaxation(bare))
         steps = dict(zip(names, slopes * mean[:count], strict=True))
         means = {name: float(np.clip(values[name] + x, *get_parameter(name).bounds)) for name, x in steps.items()}
         fitted = Covariance(names, covariance[:count, :count] * np.outer(slopes, slopes))
         return means, fitted.restricted([name for name in names if name not in bare.at_bound])
 
-    def weigh(self, sets: Sequence[GroupSet]) -> list[GroupEvidence]:
-        """Evidence of the tests for sets of explanations, averaged over the likely sizes of the rig's errors.
+    def weigh(self, sets: Sequence[SignatureSet]) -> list[Evidence]:
+        """Evidence of the tests for further explanations, averaged over the likely sizes of the rig's errors.
+
+        Args:
+            sets: signatures (residual changes) of the explanations, in sets that change the same residuals.
 
         Returns:
             One evidence per explanation, in the same order.
         """
-        return self.linear.group_evidence(sets, self._likely_cases)
+        return self.linear.explanation_evidence(sets, self._likely_cases)
 
     @cached_property
     def _likely_cases(self) -> Array:
         """Indices of the noise cases (sizes of the rig's errors) with a high evidence, alone or with a smooth curve."""
         return self.linear.likely_cases(self.columns.curves, _NEAR)
 
-    def extended(
-        self, evidence: GroupEvidence, last: Explanation | None = None, log_odds: float = 0.0
-    ) -> list[Hypothesis]:
+    def extended(self, evidence: Evidence, last: Explanation | None = None, log_odds: float = 0.0) -> list[Hypothesis]:
         """List the hypotheses with the explanations of this search state and at most one further explanation.
 
         Args:
@@ -315,7 +316,7 @@ class SearchState:
 
 
 def mean_parameters(hypotheses: Sequence[Hypothesis], names: Sequence[str]) -> tuple[dict[str, float], Covariance]:
-    """Average the posteriors of parameters over hypotheses by probability.
+    """Average the posterior means and covariances of parameters over hypotheses, weighted by probability.
 
     Args:
         hypotheses: refitted hypotheses whose models have these parameters.

@@ -21,10 +21,10 @@ from functools import cached_property
 import numpy as np
 from scipy.special import chdtrc, softmax
 
-from bushfit.diagnosis.explanations import Group
-from bushfit.diagnosis.group_evidence import GroupEvidence, average, block_gains, largest_gain, posterior
+from bushfit.diagnosis.evidence import Evidence, block_gains, largest_gain, mean_evidence, posterior
+from bushfit.diagnosis.explanations import Signature
 from bushfit.diagnosis.priors import SIZES
-from bushfit.diagnosis.projected_columns import Batch, CompoundDeviation, GroupSet, RigRows
+from bushfit.diagnosis.projected_columns import Batch, CompoundDeviation, RigRows, SignatureSet
 from bushfit.diagnosis.rig_errors import RigErrors
 from bushfit.effects.contract import Array
 
@@ -38,17 +38,18 @@ _SMALL = 0.03
 
 @dataclass(frozen=True, eq=False)
 class Projection:
-    """Residuals from which the effect of parameters and of the rubber's deviation is removed, for c noise cases.
+    """Residuals from which changes by parameters and by the rubber's smooth deviation are removed, for c noise cases.
 
-    A noise case is an assumption on the sizes of the rig's errors. The projection matrix P is defined in the notes of
-    the module.
+    A noise case is one combination of assumed sizes of the rig's errors and of the deviation. P is the inverse
+    covariance of the residuals in a noise case with the parameters projected out, see the notes of the module.
 
     Args:
         rows: the residual, then its derivatives with respect to the k parameters, (1 + k, n).
         compound: smooth deviation of the rubber from the model's laws, with q modes.
-        cases: indices of the noise cases, (c,).
-        base: natural log of the prior weight of the case times the evidence without a further explanation, (c,).
-        misfit: r^T P r of the residuals r, (c,).
+        cases: indices of the noise cases among those of the rig, (c,).
+        base: natural log of the prior weight of each case times the marginal likelihood of the tests if nothing
+            further is missing, (c,).
+        misfit: squared norm r^T P r of the residuals r that remain, (c,).
         deviation: posterior mean of the amounts of the q modes of the compound's deviation, (c, q).
         modes: inner products of the modes with the rows, (c, q, 1 + k), each times the square root of the posterior
             variance of the mode's amount without parameters; and this root, (c, q).
@@ -66,8 +67,11 @@ class Projection:
     root: tuple[Array, Array]
     free: Array
 
-    def products(self, groups: GroupSet) -> Iterator[tuple[Batch, Array, Array]]:
-        """Inner products, in the metric P, of the columns U of each block with the residuals r and with each other.
+    def products(self, signatures: SignatureSet) -> Iterator[tuple[Batch, Array, Array]]:
+        """Yield inner products U^T P r and U^T P U of the residuals r and the residual changes U of explanations.
+
+        Args:
+            signatures: residual changes per unit amount of several explanations, in blocks that act together.
 
         Yields:
             For each batch of blocks of equal width: the batch; U^T P r, (c, blocks, width); and U^T P U, (c, blocks,
@@ -75,12 +79,12 @@ class Projection:
         """
         used, index = np.unique(self.rows.rig.combinations[1][self.cases], return_inverse=True)
         (modes, spread), (root, scale) = self.modes, self.root
-        smooth = spread[..., None] * groups.with_modes(self.compound, used)[index]
-        products = self.rows.inner(groups.rows, used)[index] - modes.swapaxes(1, 2) @ smooth
+        smooth = spread[..., None] * signatures.with_modes(self.compound, used)[index]
+        products = self.rows.inner(signatures.rows, used)[index] - modes.swapaxes(1, 2) @ smooth
         free = np.linalg.solve(root, products[:, 1:] / scale[:, None])
         projections = products[:, 0] - np.einsum("ck,ckg->cg", self.free, free)
         absorbed = np.concatenate((smooth, free), axis=1).swapaxes(1, 2)  # (c, columns, q + k)
-        for batch, in_block in zip(groups.batches, groups.within(used), strict=True):
+        for batch, in_block in zip(signatures.batches, signatures.within(used), strict=True):
             of_blocks = absorbed[:, batch.columns]
             gram = in_block[index] - of_blocks @ of_blocks.swapaxes(-1, -2)
             yield batch, projections[:, batch.columns], gram
@@ -91,7 +95,7 @@ class LinearModel:
     """Linearised residuals of a fitted model, from which the evidence for each further explanation is computed.
 
     A log evidence is the natural log of the marginal likelihood, up to a common constant, averaged over noise cases:
-    assumptions on the sizes of the rig's errors and of the rubber's smooth deviation from the model's laws.
+    combinations of assumed sizes of the rig's errors and of the rubber's smooth deviation from the model's laws.
 
     Args:
         residual: residuals in units of the scatter from point to point, (n,).
@@ -111,7 +115,7 @@ class LinearModel:
 
     @cached_property
     def rows(self) -> RigRows:
-        """Residual, then the rows of the Jacobian, (1 + k, n), with their inner products."""
+        """Residual, then its derivatives with respect to the k parameters, (1 + k, n)."""
         return RigRows(np.concatenate([self.residual[None], self.jacobian]), self.rig)
 
     @cached_property
@@ -129,7 +133,7 @@ class LinearModel:
             Log evidence without a further explanation in each case, and the projected residuals, to test explanations.
         """
         rig, rows, deviates = self.rig, self.rows, bool(self.rig.deviation[cases].any())
-        none = Group(np.zeros((0, self.residual.size)), np.zeros((0, 1)), act_together=True)
+        none = Signature(np.zeros((0, self.residual.size)), np.zeros((0, 1)), act_together=True)
         compound = self.compound if self.compound and deviates else CompoundDeviation(none, rig)
         combinations = rig.combinations[1][cases]
         used, index = np.unique(combinations, return_inverse=True)
@@ -152,43 +156,48 @@ class LinearModel:
         return Projection(rows, compound, cases, base, misfit, deviation, of_modes, factor, free[..., 0])
 
     @cached_property
-    def over_cases(self) -> tuple[Array, Array, Array]:
-        """Log evidence, squared misfit and mean deviation of the rubber (see `Projection`) in all noise cases."""
+    def evidence_by_case(self) -> tuple[Array, Array, Array]:
+        """Evidence of the tests for the fitted model with nothing further missing, in each of c noise cases.
+
+        Returns:
+            Natural log of the prior weight of the case times the marginal likelihood, (c,); squared norm of the
+            projected residuals, (c,); and posterior mean amounts of the q modes of the rubber's deviation, (c, q).
+        """
         projection = self.project(self.cases)
         return projection.base, projection.misfit, projection.deviation
 
-    def group_evidence(self, sets: Sequence[GroupSet], cases: Array | None = None) -> list[GroupEvidence]:
-        """Evidence of the tests for each explanation in several sets, with rig errors within the stated accuracy.
+    def explanation_evidence(self, sets: Sequence[SignatureSet], cases: Array | None = None) -> list[Evidence]:
+        """Evidence of the tests for each of several explanations, with rig errors within the stated accuracy.
 
         Args:
-            sets: the explanations.
+            sets: signatures (residual changes) of the explanations, in sets that change the same residuals.
             cases: indices of the noise cases (assumed sizes of the errors of rig and rubber) to average over; None for
                 all.
 
         Returns:
-            Evidence of each group of the first set, then of the second, and so on.
+            Evidence of each explanation of the first set, then of the second, and so on.
         """
         projection = self.project(self.cases if cases is None else cases)
         plain, deviates = self.rig.is_plain[projection.cases], self.rig.deviation[projection.cases] > 0.0
-        evidence = list[GroupEvidence]()
-        for groups in sets:
-            by_group = dict[int, GroupEvidence]()
-            for batch, projections, gram in projection.products(groups):
+        evidence = list[Evidence]()
+        for signatures in sets:
+            by_signature = dict[int, Evidence]()
+            for batch, projections, gram in projection.products(signatures):
                 gain, changes = block_gains(batch, projections, gram)
-                log_evidence = projection.base[:, None, None] + gain
-                alone, bent = (average(batch.groups, log_evidence[mask], changes[mask]) for mask in (plain, deviates))
+                sums, owners = projection.base[:, None, None] + gain, batch.signatures
+                alone, bent = (mean_evidence(owners, sums[mask], changes[mask]) for mask in (plain, deviates))
                 deviating = bent if deviates.any() else dict.fromkeys(alone)
-                by_group |= {n: replace(x, with_compound=deviating[n]) for n, x in alone.items()}
-            evidence += [by_group[number] for number in range(len(groups.groups))]
+                by_signature |= {n: replace(x, with_compound=deviating[n]) for n, x in alone.items()}
+            evidence += [by_signature[number] for number in range(len(signatures.signatures))]
         return evidence
 
     @cached_property
-    def evidence(self) -> GroupEvidence:
+    def evidence(self) -> Evidence:
         """Evidence of the tests without a further explanation, with rig errors within the stated accuracy.
 
         If the rubber may deviate from the model, `size` and `likeliest` are those of the deviation, relative to |K|.
         """
-        (base, _, amounts), deviation, with_compound = self.over_cases, self.rig.deviation[self.cases], None
+        (base, _, amounts), deviation, with_compound = self.evidence_by_case, self.rig.deviation[self.cases], None
         if self.compound and (deviates := deviation > 0.0).any():
             log_evidence, sizes = float(np.logaddexp.reduce(base[deviates])), deviation[deviates]
             share = np.exp(base[deviates] - log_evidence)
@@ -196,21 +205,21 @@ class LinearModel:
             likely = np.flatnonzero(share > _NEGLIGIBLE)
             combinations = self.rig.combinations[1][self.cases][deviates]
             changes = self.compound.largest_changes(amounts[deviates][likely], combinations[likely])
-            with_compound = GroupEvidence(log_evidence, float(np.sqrt(share[likely] @ changes)), float(likeliest))
+            with_compound = Evidence(log_evidence, float(np.sqrt(share[likely] @ changes)), float(likeliest))
         plain = np.logaddexp.reduce(base[self.rig.is_plain[self.cases]])
-        return GroupEvidence(float(plain), 0.0, 0.0, with_compound)
+        return Evidence(float(plain), 0.0, 0.0, with_compound)
 
     @property
     def log_evidence_with_level_errors(self) -> float:
-        """Natural log of the evidence if only rig errors of levels exceed the stated accuracy, see `priors.LEVELS`."""
+        """Natural log of the evidence with errors shared by each amplitude or frequency beyond the rig's accuracy."""
         wide = ~self.rig.is_plain & (self.rig.deviation == 0.0)
-        return float(np.logaddexp.reduce(self.over_cases[0][wide[self.cases]]))
+        return float(np.logaddexp.reduce(self.evidence_by_case[0][wide[self.cases]]))
 
-    def likely_cases(self, curves: Sequence[GroupSet], far: float) -> Array:
+    def likely_cases(self, curves: Sequence[SignatureSet], far: float) -> Array:
         """Select the noise cases (assumed sizes of the errors of rig and rubber) with a high evidence.
 
         Args:
-            curves: smooth curves, one of which may explain a gap.
+            curves: residual changes of smooth curves, one of which may explain a gap.
             far: difference in log evidence from the best case beyond which a case is left out.
 
         Returns:
@@ -218,7 +227,7 @@ class LinearModel:
             with the same rig errors and a deviation, or the case with one of the curves, is within `far` of the best.
         """
         plain, index = self.rig.is_plain[self.cases], self.rig.combinations[1][self.cases]
-        base = np.where(plain | (self.rig.deviation[self.cases] > 0.0), self.over_cases[0], -np.inf)
+        base = np.where(plain | (self.rig.deviation[self.cases] > 0.0), self.evidence_by_case[0], -np.inf)
         best = np.full(index.max() + 1, -np.inf)
         np.maximum.at(best, index, base)
         near = (base > base.max() - far) | (plain & (base > base[plain].max() - far))
@@ -241,11 +250,11 @@ class LinearModel:
         are the whitened residuals, and P projects out the parameters.
         """
         chosen = self.rig.deviation > 0.0 if compound_deviates else self.rig.is_plain
-        base = np.where(chosen[self.cases], self.over_cases[0], -np.inf)
+        base = np.where(chosen[self.cases], self.evidence_by_case[0], -np.inf)
         freedom = max(self.residual.size - int(np.count_nonzero(self.precision == 0.0)), 1)
-        return float(np.exp(base - np.logaddexp.reduce(base)) @ chdtrc(freedom, self.over_cases[1]))
+        return float(np.exp(base - np.logaddexp.reduce(base)) @ chdtrc(freedom, self.evidence_by_case[1]))
 
-    def parameters(self, relaxation: Array) -> tuple[Array, Array]:
+    def posterior_parameters(self, relaxation: Array) -> tuple[Array, Array]:
         """Posterior of the changes of the k parameters from their fitted values, averaged over noise cases.
 
         Args:
@@ -259,9 +268,9 @@ class LinearModel:
         evidence by N(a; 0, c + v^2)/N(a; 0, c), where a is its estimate and c the variance of a (Savage and Dickey).
         """
         rows = np.concatenate((self.jacobian, relaxation[None]))
-        groups = GroupSet((Group(rows, np.eye(len(rows)), act_together=True),), self.rig)
+        signatures = SignatureSet((Signature(rows, np.eye(len(rows)), act_together=True),), self.rig)
         alone = replace(self, jacobian=self.jacobian[:0], precision=self.precision[:0]).project(self.cases)
-        ((_, projections, grams),) = alone.products(groups)
+        ((_, projections, grams),) = alone.products(signatures)
         wide = np.append(self.precision, np.square(_SMALL / SIZES[-1]))
         scale, information = _scale_information(grams[:, 0], rows, wide)
         covariance = np.linalg.inv(information) / np.outer(scale, scale)
@@ -269,7 +278,7 @@ class LinearModel:
         amount, variance, cross = shift[:, -1:], covariance[:, -1, -1:], covariance[:, :, -1]
         deviates = self.rig.deviation[self.cases] > 0.0
         total = variance + np.square(SIZES) * deviates[:, None]  # (cases, sizes)
-        base = np.where(self.rig.is_plain[self.cases] | deviates, self.over_cases[0], -np.inf)
+        base = np.where(self.rig.is_plain[self.cases] | deviates, self.evidence_by_case[0], -np.inf)
         gain = 0.5 * (np.log(variance / total) + np.square(amount) * (1.0 / variance - 1.0 / total))
         share = softmax(base[:, None] + gain)
         means = shift[:, None] - cross[:, None] * (amount / total)[..., None]
@@ -279,18 +288,18 @@ class LinearModel:
         matrix += np.einsum("ns,nsi,nsj->ij", share, means - mean, means - mean)
         return -mean[:-1], matrix[:-1, :-1]
 
-    def amounts(self, groups: GroupSet, cases: Array) -> tuple[Array, Array]:
-        """Posterior mean and covariance of the amounts of each of b groups with g columns that act together.
+    def posterior_amounts(self, signatures: SignatureSet, cases: Array) -> tuple[Array, Array]:
+        """Posterior mean and covariance of the amounts (coefficients) of the g columns of each of b explanations.
 
         Args:
-            groups: the groups, with equal changes of the stiffness.
+            signatures: residual changes of the explanations, each with g columns that act together.
             cases: indices of the noise cases, with rig errors within the stated accuracy.
 
         Returns:
             Mean, (b, g), and covariance, (b, g, g), averaged over all sizes of the amounts and of the rig's errors.
         """
         projection = self.project(cases)
-        ((_, projections, gram),) = projection.products(groups)
+        ((_, projections, gram),) = projection.products(signatures)
         gain, means, variances, vectors = posterior(gram, projections)
         share = softmax(gain + projection.base[:, None, None], axis=(0, 2))
         mean = np.einsum("nbs,nbsi->bi", share, means)
@@ -299,10 +308,10 @@ class LinearModel:
 
 
 def _scale_information(grams: Array, rows: Array, precision: Array) -> tuple[Array, Array]:
-    """Scale the information matrix of k parameters so that its diagonal is nearly 1, and make it invertible.
+    """Scale the information matrices of k parameters to a diagonal of nearly 1, and make them invertible.
 
     Args:
-        grams: information matrix for each assumed size of the rig's errors, (cases, k, k).
+        grams: information matrix (inverse covariance) in each noise case, (cases, k, k).
         rows: derivatives of the residuals with respect to the parameters, (k, n).
         precision: prior precision (inverse variance) of each parameter, (k,).
 

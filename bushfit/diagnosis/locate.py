@@ -44,8 +44,8 @@ _HARMONICS = {
 
 
 @dataclass(frozen=True, eq=False)
-class LineMisfit:
-    """Mean misfit of one line of a sweep (all runs at one constant amplitude or frequency) over its repeats.
+class LevelMisfit:
+    """Mean misfit over the repeats of one level of a sweep: all runs at one constant amplitude or frequency.
 
     Args:
         sweep: the sweep.
@@ -66,7 +66,7 @@ class LineMisfit:
 
     @property
     def label(self) -> str:
-        """Text with the line's constant quantity and its preload, such as "0.1 mm"; else the name of the test."""
+        """Text with the constant amplitude or frequency and the preload, such as "0.1 mm"; else the test's name."""
         sweep, first = self.sweep, self.rows[0]
         constant = f"{sweep.frequency[first]:.4g} Hz" if sweep.test.stepped else sweep.name
         if sweep.test.stepped == "frequency":
@@ -81,11 +81,11 @@ class LineMisfit:
         return basis @ np.linalg.lstsq(basis.astype(complex), self.misfit, rcond=None)[0]
 
 
-def line_misfits(sweep: MeasuredSweep, model: Model) -> Iterator[LineMisfit]:
-    """Compare a model with each line of a sweep: all runs at one constant amplitude or frequency.
+def level_misfits(sweep: MeasuredSweep, model: Model) -> Iterator[LevelMisfit]:
+    """Yield the misfit of a model at each level of a sweep: all runs at one constant amplitude or frequency.
 
     Yields:
-        Mean misfit along a line, over its repeats.
+        Misfit over the stepped quantity, averaged over the repeats of the level.
     """
     ratio = sweep.measured / sweep.response(model) - 1.0
     for held_value in np.unique(sweep.held_value):
@@ -96,7 +96,7 @@ def line_misfits(sweep: MeasuredSweep, model: Model) -> Iterator[LineMisfit]:
         mean = (np.bincount(index, ratio[mask].real) + 1j * np.bincount(index, ratio[mask].imag)) / counts
         variance = np.square(sweep.noise.random[sweep.name, float(held_value)]) + np.square(sweep.noise.shared)
         noise = np.sqrt(variance / np.median(counts) + np.square(sweep.noise.level))
-        yield LineMisfit(sweep, np.flatnonzero(mask)[first], mean, noise)
+        yield LevelMisfit(sweep, np.flatnonzero(mask)[first], mean, noise)
 
 
 def find_regions(fit: FitResult) -> tuple[MisfitRegion, ...]:
@@ -109,7 +109,7 @@ def find_regions(fit: FitResult) -> tuple[MisfitRegion, ...]:
 def _sweep_regions(fit: FitResult) -> Iterator[MisfitRegion]:
     """Yield for each direction the regions where the storage and the loss of sweeps deviate smoothly from the model."""
     _, sweeps = split_by_kind(fit.data_sets)
-    lines = [line for sweep in sweeps for line in line_misfits(sweep, fit.model)]
+    lines = [line for sweep in sweeps for line in level_misfits(sweep, fit.model)]
     kinds = [(line.sweep.direction, line.sweep.test.stepped) for line in lines]
     for direction, stepped in dict.fromkeys(kinds):
         mine = [line for line, kind in zip(lines, kinds, strict=True) if kind == (direction, stepped)]
@@ -134,18 +134,18 @@ def _sweep_regions(fit: FitResult) -> Iterator[MisfitRegion]:
 
 def _describe_sweep_misfit(
     part: str,
-    lines: Sequence[LineMisfit],
+    lines: Sequence[LevelMisfit],
     pieces: Sequence[Array],
     touched: Sequence[int],
     spans: tuple[tuple[float, float], tuple[float, float]],
 ) -> str:
-    """Sentence on the sign and size of a smooth misfit of sweeps, and on its trends along each line and between lines.
+    """Sentence on sign and size of a smooth misfit of sweeps, and on its trends along each level and between levels.
 
     Args:
         part: "storage" or "loss".
-        lines: lines of the sweeps of one direction.
-        pieces: smooth misfit along each line, measured minus model relative to |K|, (n,) each.
-        touched: indices of the lines that belong to the region.
+        lines: misfits at the levels (constant amplitudes or frequencies) of the sweeps of one direction.
+        pieces: smooth misfit along each level, measured minus model relative to |K|, (n,) each.
+        touched: indices of the levels that belong to the region.
         spans: lowest and highest frequency [Hz], and amplitude [m or rad], of the region.
     """
     quantity = "stiffness" if part == "storage" else "loss"
@@ -179,7 +179,7 @@ def _describe_sweep_misfit(
 
 
 def _trend(stepped: str, step: Array, misfit: Array) -> str:
-    """Phrase on the trend of a misfit along a line: constant, or the power of the stepped quantity that fits best.
+    """Phrase on the trend of a misfit along a level: constant, or the power of the stepped quantity that fits best.
 
     Args:
         stepped: "frequency" or "amplitude".
@@ -198,10 +198,10 @@ def _trend(stepped: str, step: Array, misfit: Array) -> str:
 
 
 def _trend_verb(first: float, last: float) -> str:
-    """Verb phrase for a misfit along a line: "grows", "fades" or "goes from above to below the model".
+    """Verb phrase for a misfit along a level: "grows", "fades" or "goes from above to below the model".
 
     Args:
-        first, last: measured minus model stiffness, relative to |K|, at both ends of a line.
+        first, last: measured minus model stiffness, relative to |K|, at both ends of a level.
     """
     if first * last < 0.0 and min(abs(first), abs(last)) > _FLAT * max(abs(first), abs(last)):
         return f"goes from {'above to below' if first > 0.0 else 'below to above'} the model"

@@ -96,21 +96,21 @@ def deciding_test(
         return ""
     undecided = float(remaining_entropy(odds, np.zeros((len(models), len(models)))))
     best, best_rate = "", _LEAST_INFORMATION
-    for test in _candidates(data_sets, models[0].bushing):
-        frequency, amplitude, place = _points(test, data_sets)
+    for test in _candidate_tests(data_sets, models[0].bushing):
+        frequency, amplitude, place = _operating_points(test, data_sets)
         feasible = np.all([within_limits(model, rig, place, frequency, amplitude) for model in models], axis=0)
         if test.mounted is None and not feasible.any():
             continue
         points = (frequency[feasible], amplitude[feasible]) if test.mounted is None else (frequency, amplitude)
-        distances = _distances(test, models, place, *points)
+        distances = _chi_squares(test, models, place, *points)
         rate = (undecided - float(remaining_entropy(odds, distances))) / test.hours
         if rate > best_rate * (1.0 + 1e-9):
             best, best_rate = test.sentence, rate
     return best
 
 
-def _candidates(data_sets: Sequence[MeasuredTest], bushing: Bushing | None) -> Iterator[NextTest]:
-    """Generate the candidate tests: of the fixture without the bushing, and of the bushing in directions not swept."""
+def _candidate_tests(data_sets: Sequence[MeasuredTest], bushing: Bushing | None) -> Iterator[NextTest]:
+    """Yield candidate tests: of the fixture without the bushing, and of the bushing at new and at tested conditions."""
     places = dict.fromkeys(data_set.direction for data_set in data_sets)
     for place, test in product(places, FIXTURE_TESTS):
         yield replace(test, place=place, sentence=test.sentence.format(place=place))
@@ -121,7 +121,7 @@ def _candidates(data_sets: Sequence[MeasuredTest], bushing: Bushing | None) -> I
 
 
 def within_limits(model: Model, rig: RigSettings, place: Place, frequency: Array, amplitude: Array) -> Array:
-    """Check operating points against the limits of a rig.
+    """Mask of the operating points that are within the limits of a rig, (n,).
 
     Args:
         model: model that predicts the force.
@@ -164,8 +164,8 @@ def remaining_entropy(odds: Sequence[float] | Array, distances: Array) -> Array:
     return np.asarray(np.log1p(overlap @ p / p) @ p)
 
 
-def _distances(test: NextTest, models: Sequence[Model], place: Place, frequency: Array, amplitude: Array) -> Array:
-    """Compute the chi-square between the responses of each pair of models to a test.
+def _chi_squares(test: NextTest, models: Sequence[Model], place: Place, frequency: Array, amplitude: Array) -> Array:
+    """Chi-square between the responses of each pair of models to a candidate test, (models, models).
 
     Args:
         test: candidate test.
@@ -175,11 +175,11 @@ def _distances(test: NextTest, models: Sequence[Model], place: Place, frequency:
         amplitude: zero-to-peak [m or rad, or strain], (n,).
 
     Returns:
-        Chi-square for the noise of the test, (models, models). The empty fixture is compared by its stiffness and the
+        Sums of squared differences in units of the test's noise. The empty fixture is compared by its stiffness and the
         steel dummy by its compliance, because either is nearly zero and its logarithm has no meaning.
     """
     if test.mounted is None:
-        responses = [_log(model.stiffness(place, frequency, amplitude)) for model in models]
+        responses = [_finite_log(model.stiffness(place, frequency, amplitude)) for model in models]
     else:
         reference = np.abs(models[0].stiffness(place, frequency, amplitude)).mean()
         measured = []
@@ -189,19 +189,19 @@ def _distances(test: NextTest, models: Sequence[Model], place: Place, frequency:
             fixture = Model.with_defaults(model.bushing, ("elastic", *rig), {**model.values, "mu": modulus})
             measured.append(fixture.stiffness(place, frequency, amplitude) / reference)
         if test.mounted == _SPRING:
-            responses = [_log(ratio) for ratio in measured]
+            responses = [_finite_log(ratio) for ratio in measured]
         else:
             responses = [1.0 / ratio if test.mounted == _DUMMY else ratio for ratio in measured]
     stacked = np.array(responses)
     return np.sum(np.square(np.abs(stacked[:, None] - stacked)), axis=-1) / _NOISE**2
 
 
-def _log(stiffness: Array) -> Array:
+def _finite_log(stiffness: Array) -> Array:
     """Natural log of a complex stiffness, finite even where a model has no stiffness."""
     return np.log(stiffness + np.finfo(float).tiny)
 
 
-def _points(test: NextTest, data_sets: Sequence[MeasuredTest]) -> tuple[Array, Array, Place]:
+def _operating_points(test: NextTest, data_sets: Sequence[MeasuredTest]) -> tuple[Array, Array, Place]:
     """Operating points of a candidate test, as all combinations of its frequencies and amplitudes.
 
     Args:

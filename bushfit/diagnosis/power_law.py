@@ -2,10 +2,10 @@
 
 Notes:
     The power law is a stiffness A e^(i phi) (f/f0)^p (X/X0)^q that is added to the model (a term) and fitted together
-    with all parameters. For each pair of powers p and q on a grid, its parts in phase and in quadrature are a group of
-    columns around the parameters of the most probable pair. The evidence of each pair and its amounts form the
-    posterior from which phase and powers are drawn. The evidence of smooth curves of any form decides whether the gap
-    is a power law at all.
+    with all parameters. For each pair of powers p and q on a grid, the residuals are linearised in its parts in phase
+    and in quadrature, around the parameters of the most probable pair. The evidence of each pair and its amounts form
+    the posterior from which phase and powers are drawn. The evidence of smooth curves of any form decides whether the
+    gap is a power law at all.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ import numpy as np
 from scipy.special import logsumexp, softmax
 
 from bushfit.campaign.schema import RigSettings
-from bushfit.diagnosis.explanations import Group
+from bushfit.diagnosis.explanations import Signature
 from bushfit.diagnosis.linear_model import LinearModel
 from bushfit.diagnosis.priors import DECISIVE_CHI_SQUARE
-from bushfit.diagnosis.projected_columns import GroupSet
+from bushfit.diagnosis.projected_columns import SignatureSet
 from bushfit.diagnosis.rig_errors import RigErrors, in_scatter_units, rig_errors
 from bushfit.diagnosis.smooth_deviations import unnamed_curves
 from bushfit.effects.contract import Array
@@ -38,7 +38,7 @@ from bushfit.model.sensitivity import difference_quotients, stepped_values
 from bushfit.units import number
 
 #: Unit of the added stiffness: N/m or N m/rad over displacement, Pa over strain, or a share of the model's stiffness.
-Measure = Literal["stiffness", "modulus", "gain"]
+Quantity = Literal["stiffness", "modulus", "gain"]
 #: A value and the ends of its 95 % interval.
 Interval = tuple[float, float, float]
 
@@ -60,8 +60,8 @@ _DRAWS = 10_000
 _POWER_WIDTH, _PHASE_WIDTH = 0.75, 60.0
 #: Standard errors within which a known law may lie for the term to act like it, in phase and powers each.
 _LIKE = 2.5
-#: Known laws: phase [deg], power of frequency, power of amplitude, measures, text.
-_LAWS: tuple[tuple[float, float, float, tuple[Measure, ...], str], ...] = (
+#: Known laws: phase [deg], power of frequency, power of amplitude, quantities, text.
+_LAWS: tuple[tuple[float, float, float, tuple[Quantity, ...], str], ...] = (
     (90, 1, 0, ("stiffness", "modulus"), "a damper"),
     (180, 2, 0, ("stiffness", "modulus"), "a mass"),
     (0, 0, 2, ("stiffness", "modulus"), "a spring that stiffens with the cube of the displacement"),
@@ -72,7 +72,7 @@ _LAWS: tuple[tuple[float, float, float, tuple[Measure, ...], str], ...] = (
     (90, 1, 0, ("gain",), "a delay of the displacement"),
     (-90, 1, 0, ("gain",), "a delay of the force"),
 )
-_MEASURES: dict[Measure, str] = {
+_QUANTITIES: dict[Quantity, str] = {
     "stiffness": "equal in N/mm in every direction",
     "modulus": "equal as a modulus over strain",
     "gain": "equal in % of |K| in every direction",
@@ -85,17 +85,18 @@ class PowerLaw:
     """Power law A e^(i phi) (f/f0)^p (X/X0)^q of the stiffness that a model lacks, with 95 % intervals.
 
     Args:
-        measure: unit of A with the highest evidence: stiffness, modulus or share of the model's stiffness.
-        alternatives: other units that fit nearly as well; the intervals average over all units by probability.
+        quantity: quantity that the law adds, with the highest evidence: "stiffness" (equal in N/m in every direction),
+            "modulus" (equal in Pa over strain) or "gain" (equal as a share of the model's stiffness).
+        alternatives: other quantities that fit nearly as well; the intervals average over all of them by probability.
         phase_deg: phase phi [deg], with the ends of its interval.
         frequency_power: power p of frequency, with the ends of its interval.
         amplitude_power: power q of amplitude, with the ends of its interval.
         is_likely: True if the evidence of the power law exceeds that of a smooth curve of any form.
-        of_one_place: True if only one direction or specimen was tested, so that the units cannot be distinguished.
+        of_one_place: True if only one direction or specimen was tested, so that the quantities cannot be distinguished.
     """
 
-    measure: Measure
-    alternatives: tuple[Measure, ...]
+    quantity: Quantity
+    alternatives: tuple[Quantity, ...]
     phase_deg: Interval
     frequency_power: Interval
     amplitude_power: Interval
@@ -126,9 +127,9 @@ class PowerLaw:
                 parts.append(f"independent of {axis}")
             elif determined:
                 parts.append(f"{'grows' if value > 0 else 'falls'} as {symbol}^{number(value, 2)}")
-        measures = (self.measure, *self.alternatives)
-        if not self.of_one_place and len(measures) < len(_MEASURES):
-            parts.append(" or ".join(_MEASURES[measure] for measure in measures))
+        quantities = (self.quantity, *self.alternatives)
+        if not self.of_one_place and len(quantities) < len(_QUANTITIES):
+            parts.append(" or ".join(_QUANTITIES[quantity] for quantity in quantities))
         like = self._known_law() if all(self.determined) else ""
         return f"acts like {like}: " * bool(like) + ", ".join(parts or ["these tests do not determine its form"])
 
@@ -137,8 +138,8 @@ class PowerLaw:
         ends = np.array([self.phase_deg, self.frequency_power, self.amplitude_power])[:, 1:]
         errors = np.maximum(np.ptp(ends, axis=1) / 2.0 / Z95, 1e-9)
         distances = {}
-        for *law, measures, text in _LAWS:
-            if {self.measure, *self.alternatives} & {*measures}:
+        for *law, quantities, text in _LAWS:
+            if {self.quantity, *self.alternatives} & {*quantities}:
                 deviation = ends.mean(axis=1) - law
                 deviation[0] = (deviation[0] + 180.0) % 360.0 - 180.0
                 distances[text] = float(np.max(np.abs(deviation) / errors))
@@ -148,18 +149,18 @@ class PowerLaw:
 
 @dataclass(frozen=True, eq=False)
 class Term:
-    """Complex stiffness that a model lacks at p operating points, in one of three units, to be fitted by a power law.
+    """Complex stiffness that a model lacks at p operating points, in one of three quantities, to fit by a power law.
 
-    The points are those of all tests except tests of coupons. In the methods, `value` is the added stiffness at the
-    points in the unit `measure`, (p,), and a shape is the value for an amount of 1.
+    The points are those of all tests except tests of coupons. In the methods, `value` is the added stiffness, modulus
+    or share of the stiffness at the points, complex (p,): an amount times a shape.
 
     Args:
         fit: the fitted model and the tests.
-        measure: unit of the added stiffness, see `Measure`.
+        quantity: "stiffness" [N/m or N m/rad], "modulus" [Pa] or "gain" (share of the model's stiffness).
     """
 
     fit: FitResult
-    measure: Measure
+    quantity: Quantity
 
     @cached_property
     def tests(self) -> list[tuple[MeasuredTest, slice]]:
@@ -171,7 +172,7 @@ class Term:
     @cached_property
     def points(self) -> Array:
         """Centred natural logs of frequency and motion (displacement, rotation or strain) at each point, (p, 2)."""
-        model, over_strain = self.fit.model, self.measure != "stiffness"
+        model, over_strain = self.fit.model, self.quantity != "stiffness"
         axes = [
             (test.frequency, test.amplitude * (model.unit_strain(test.direction) if over_strain else 1.0))
             for test, _ in self.tests
@@ -186,10 +187,10 @@ class Term:
         )
 
     def unit(self, model: Model) -> Array:
-        """Stiffness that one unit of `measure` adds at each of the p operating points, (p,) [N/m or N m/rad]."""
-        if self.measure == "gain":
+        """Stiffness that one unit of `quantity` adds at each of the p operating points, (p,) [N/m or N m/rad]."""
+        if self.quantity == "gain":
             return self.stiffness(model)
-        per_unit = model.stiffness_per_modulus if self.measure == "modulus" else lambda _: 1.0
+        per_unit = model.stiffness_per_modulus if self.quantity == "modulus" else lambda _: 1.0
         return np.concatenate([np.full(test.frequency.size, per_unit(test.direction)) for test, _ in self.tests])
 
     def scaled(self, shapes: Array, model: Model) -> Array:
@@ -227,7 +228,7 @@ class Term:
         for test, points in self.tests:
             columns[:, place[test]] = test.residual_change(changes[:, points], model, added[points])
             residuals[place[test]] -= test.residual_change(added[points], model, added[points])
-            share = added[points] if self.measure == "gain" else 0.0  # which stays proportional to the stiffness
+            share = added[points] if self.quantity == "gain" else 0.0  # which stays proportional to the stiffness
             if isinstance(test, MeasuredSweep):
                 stepped, steps = stepped_values(model, names, test.direction)
                 stiffness, change = difference_quotients(test.response(model, stepped), steps)
@@ -256,19 +257,19 @@ def nearest_power_law(
     bare, model = in_scatter_units(fitted), fitted.model
     begun = model.with_values({name: value for name, value in start.items() if name in model.values})
     rows, errors = bare.jacobian, rig_errors(bare, rig)
-    curves = GroupSet.split([curve.group for curve in unnamed_curves(bare) if curve.group], errors)
+    curves = SignatureSet.split([curve.signature for curve in unnamed_curves(bare)], errors)
     cases = LinearModel(bare.residual, rows, np.zeros(len(rows)), errors).likely_cases(curves, _NEAR)
     motions = {test.direction.motion for test in fitted.data_sets} - {STRAINING}
-    measures = [measure for measure in _MEASURES if motions and (measure != "stiffness" or len(motions) == 1)]
-    terms = [Term(bare, measure) for measure in measures]  # one unit: of translation only, or of rotation only
+    quantities = [quantity for quantity in _QUANTITIES if motions and (quantity != "stiffness" or len(motions) == 1)]
+    terms = [Term(bare, quantity) for quantity in quantities]  # one unit: of translation only, or of rotation only
     settled = (_settled_grid(fitted, term, errors, cases, begun, bounds) for term in terms)
     grids = sorted(filter(None, settled), key=lambda grid: -grid.log_evidence)
     if not grids or grids[0].log_evidence < logsumexp(grids[0].linear.project(cases).base):
         return None
-    of_curves = grids[0].linear.group_evidence(curves, cases)  # around the same parameters and term
+    of_curves = grids[0].linear.explanation_evidence(curves, cases)  # around the same parameters and term
     log_ratios = np.array([grid.log_evidence - grids[0].log_evidence for grid in grids])
     likely = log_ratios > -0.5 * DECISIVE_CHI_SQUARE
-    measure, *alternatives = [grid.measure for grid, is_likely in zip(grids, likely, strict=True) if is_likely]
+    likeliest, *alternatives = [grid.quantity for grid, is_likely in zip(grids, likely, strict=True) if is_likely]
     counts = np.round(_DRAWS * np.exp(log_ratios)).astype(int).tolist()
     draws = np.concatenate([grid.draws(count) for grid, count in zip(grids, counts, strict=True)], axis=-1)
     middle = np.angle(np.exp(1j * draws[0]).mean())
@@ -277,25 +278,26 @@ def nearest_power_law(
     law = logsumexp(log_ratios) + grids[0].log_evidence - log(len(grids))
     smooth = logsumexp([evidence.log_evidence for evidence in of_curves]) - log(len(of_curves))
     of_one_place = len({test.direction for test in fitted.data_sets}) == 1
-    return PowerLaw(measure, tuple(alternatives), phase, p, q, bool(law > smooth), of_one_place)
+    return PowerLaw(likeliest, tuple(alternatives), phase, p, q, bool(law > smooth), of_one_place)
 
 
 @dataclass(frozen=True, eq=False)
 class _Grid:
-    """Grid of g pairs of powers of frequency and amplitude, with the evidence of the tests for each pair.
+    """Grid of g pairs of powers of frequency and amplitude, with the evidence for each pair as the missing stiffness.
 
     Args:
-        measure: unit of the added stiffness.
-        linear: linearised model without the added stiffness.
-        groups: changes of the residuals by unit stiffness in phase and in quadrature, for each pair of powers.
-        cases: indices of the noise cases (assumed sizes of the rig's errors) to average over.
+        quantity: quantity that the law adds: "stiffness", "modulus" or "gain" (share of the stiffness).
+        linear: residuals linearised around the model without the added stiffness.
+        signatures: for each pair of powers, changes of the residuals by a law of unit amount, in phase and in
+            quadrature.
+        cases: indices of the noise cases (assumed sizes of the rig's errors) to average over, (c,).
         powers: powers of frequency and amplitude, (g, 2).
         step: spacing of the grid along each axis, (2,); 0 along an axis on which the tests do not differ.
     """
 
-    measure: Measure
+    quantity: Quantity
     linear: LinearModel
-    groups: GroupSet
+    signatures: SignatureSet
     cases: Array
     powers: Array
     step: Array
@@ -303,7 +305,7 @@ class _Grid:
     @cached_property
     def log_evidences(self) -> Array:
         """Natural log of the tests' evidence for each pair of powers of frequency and amplitude, (g,)."""
-        return np.array([x.log_evidence for x in self.linear.group_evidence([self.groups], self.cases)])
+        return np.array([x.log_evidence for x in self.linear.explanation_evidence([self.signatures], self.cases)])
 
     @property
     def log_evidence(self) -> float:
@@ -317,7 +319,7 @@ class _Grid:
         chosen = random.choice(len(self.powers), count, p=softmax(self.log_evidences))
         width = np.where(self.step > 0.0, self.step, 2.0 * _LARGEST_POWER)  # an axis without a change is unknown
         powers = self.powers[chosen] + width * (random.random((count, 2)) - 0.5)
-        parts, (means, covariances) = np.empty((count, 2)), self.linear.amounts(self.groups, self.cases)
+        parts, (means, covariances) = np.empty((count, 2)), self.linear.posterior_amounts(self.signatures, self.cases)
         for pair in np.unique(chosen):
             mask = chosen == pair
             parts[mask] = random.multivariate_normal(means[pair], covariances[pair], mask.sum(), method="eigh")
@@ -350,9 +352,9 @@ def _settled_grid(
         step = np.ptp(ends, axis=0) / (_GRID - 1)
         shapes = term.scaled(np.exp(powers @ term.points.T), model)
         residuals, rows, columns = term.linearised(model, value, shapes)
-        groups = [Group(pair, np.ones((2, 1)), act_together=True) for pair in columns]
+        signatures = [Signature(pair, np.ones((2, 1)), act_together=True) for pair in columns]
         linear = LinearModel(residuals, rows, np.zeros(len(rows)), rig)
-        grid = _Grid(term.measure, linear, GroupSet(groups, rig), cases, powers, step)
+        grid = _Grid(term.quantity, linear, SignatureSet(signatures, rig), cases, powers, step)
         share = softmax(grid.log_evidences)
         before, middle = middle, share @ powers
         spread = np.sqrt(share @ np.square(powers - middle))
@@ -362,23 +364,26 @@ def _settled_grid(
         reach = _REACH * spread + step + np.where(np.isfinite(shift), shift, 0.0)
         ends = np.clip(np.stack((middle - reach, middle + reach)), *limits)
         model, value = _gauss_newton_step(
-            Term(fitted, term.measure), model, value, np.exp(middle @ term.points.T)[None], bounds
+            Term(fitted, term.quantity), model, value, np.exp(middle @ term.points.T)[None], bounds
         )
     return None
 
 
 def _gauss_newton_step(term: Term, model: Model, value: Array, shape: Array, bounds: Bounds) -> tuple[Model, Array]:
-    """Take one damped Gauss-Newton step of the model's parameters and of the amount of an added stiffness.
+    """Take one damped Gauss-Newton step of a model's parameters and of the complex amount of an added stiffness.
+
+    The added stiffness is amount x shape. Of six dampings of the parameters, increased from 0 as long as the misfit
+    falls, the one with the smallest misfit is used.
 
     Args:
-        term: added stiffness, with its unit.
+        term: added stiffness, with its quantity.
         model: model at its current parameters.
-        value: complex values of the added stiffness at the p points, in the unit of the term, (p,).
-        shape: shape of the added stiffness at the points, (1, p).
+        value: added stiffness at the p points before the step, in the quantity of the term, complex (p,).
+        shape: power law of frequency and amplitude at the points, (1, p).
         bounds: limits of parameters inside their general limits.
 
     Returns:
-        The model, and the complex values of the added stiffness at the points, (p,).
+        The model, and the added stiffness at the points after the step, complex (p,).
     """
     shape = term.scaled(shape, model)
     residuals, rows, columns = term.linearised(model, value, shape)

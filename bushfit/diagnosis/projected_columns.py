@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import groupby
@@ -12,14 +12,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bushfit.diagnosis.explanations import Group
+from bushfit.diagnosis.explanations import Signature
 from bushfit.diagnosis.rig_errors import RigErrors
 from bushfit.effects.contract import Array
 
 
 @dataclass(frozen=True, eq=False)
 class RigRows:
-    """Changes of the residuals by m causes, to compute inner products in which errors of the rig have less weight.
+    """Changes of the residuals by m causes, for inner products weighted by the inverse covariance of the rig's errors.
 
     Args:
         rows: change X of consecutive residuals by each of m causes, such as explanations of a gap, (m, n).
@@ -33,11 +33,11 @@ class RigRows:
 
     @cached_property
     def shared(self) -> Array:
-        """Inner products of the m changes with the rig's errors, weighted by the scatter only.
+        """Inner products of the m changes with the rig's errors, weighted by the random noise only.
 
         Returns:
-            Products for each size of the scatter, each block of residuals with common errors, and each of its w errors,
-            (scatters, blocks, w, m).
+            Products for each assumed size of the random noise, each block of residuals that share errors, and each of
+            its w errors, (sizes, blocks, w, m).
         """
         weights, kernels = self.rig.weights[0], self.rig.kernels[0]
         shared = np.zeros((len(weights), len(kernels), kernels.shape[-1], len(self.rows)))
@@ -49,11 +49,11 @@ class RigRows:
         return shared
 
     def inner(self, second: RigRows, combinations: Array) -> Array:
-        """Inner products X^T S^-1 Y with the changes Y of another set.
+        """Inner products X^T S^-1 Y with other changes Y, where S is the covariance of noise and rig errors.
 
         Args:
-            second: the other set, of m2 changes.
-            combinations: indices of c assumed sizes of the rig's errors, see `RigErrors.combinations`, (c,).
+            second: the other m2 changes.
+            combinations: indices of c combinations of sizes of the rig's errors in `RigErrors.combinations`, (c,).
 
         Returns:
             Products, (c, m, m2).
@@ -81,20 +81,20 @@ class RigRows:
 
 @dataclass(frozen=True, eq=False)
 class CompoundDeviation:
-    """Smooth deviation of the rubber from the model's laws, as modes that are independent beside the errors of a rig.
+    """Smooth deviation of the rubber from the model's laws, as q modes with independent amounts under a rig's errors.
 
     Args:
-        group: q changes of the residuals, each by a deviation of unit size.
+        signature: q changes of the residuals, each by one standard deviation of a pattern, for a size of 100 % of |K|.
         rig: errors of the rig.
     """
 
-    group: Group
+    signature: Signature
     rig: RigErrors
 
     @cached_property
     def rows(self) -> RigRows:
-        """The q changes of the residuals, with their inner products."""
-        return RigRows(self.group.whole, self.rig)
+        """The q changes of the residuals, (q, n)."""
+        return RigRows(self.signature.whole, self.rig)
 
     @cached_property
     def modes(self) -> tuple[Array, Array]:
@@ -108,7 +108,7 @@ class CompoundDeviation:
         return np.maximum(values, 0.0), vectors
 
     def inner(self, rows: RigRows, combinations: Array) -> Array:
-        """Inner products of the modes with other rows.
+        """Inner products of the q modes with other residual changes.
 
         Args:
             rows: m changes of the residuals.
@@ -130,86 +130,89 @@ class CompoundDeviation:
             Squared relative change, (cases,).
         """
         vectors = self.modes[1][combinations]
-        return np.square(np.abs(np.einsum("nij,nj->ni", vectors, amounts) @ self.group.unit)).max(axis=-1)
+        return np.square(np.abs(np.einsum("nij,nj->ni", vectors, amounts) @ self.signature.unit)).max(axis=-1)
 
 
 class Batch(NamedTuple):
-    """Blocks of columns with equal width and equal change of the stiffness, so that arrays hold them all.
+    """Blocks of residual changes with equal numbers of columns and equal change of the stiffness, stored as arrays.
 
-    A block is a set of columns of residual changes that act together. A group (explanation) is one block, or one block
-    for each column.
+    A block is a set of columns of residual changes that act together. An explanation has one block, or one block for
+    each alternative column.
 
     Args:
-        groups: index of the group of each block, ascending, (blocks,).
-        columns: indices of the columns of each block among those of all groups, (blocks, width).
+        signatures: index of the explanation of each block, ascending, (blocks,).
+        columns: indices of the columns of each block among those of all signatures, (blocks, width).
         signs: +1 for a block of one column whose amount must be positive, else 0, (blocks,).
         unit: relative change of the stiffness per unit amount at p operating points, (width, p).
     """
 
-    groups: Array
+    signatures: Array
     columns: Array
     signs: Array
     unit: Array
 
 
 @dataclass(frozen=True, eq=False)
-class GroupSet:
-    """Explanations to compare, with the inner products of their residual columns, which no fitted model changes.
+class SignatureSet:
+    """Explanations to compare, with the inner products of their residual changes, cached for all fitted models.
 
     Args:
-        groups: candidate explanations that change the same residuals, each a group of columns; g columns in all.
+        signatures: residual changes of each explanation, all of the same residuals; g columns in all.
         rig: errors of the rig.
     """
 
-    groups: Sequence[Group]
+    signatures: Sequence[Signature]
     rig: RigErrors
     _within: dict[int, list[Array]] = field(default_factory=dict)
     _modes: dict[tuple[CompoundDeviation, int], Array] = field(default_factory=dict)
 
     @classmethod
-    def split(cls, groups: Sequence[Group], rig: RigErrors) -> list[GroupSet]:
-        """Build sets of the groups, in the same order; those in a row that change the same residuals are one set."""
-        return [cls(list(members), rig) for _, members in groupby(groups, attrgetter("rows"))]
+    def split(cls, signatures: Iterable[Signature | None], rig: RigErrors) -> list[SignatureSet]:
+        """Build sets of the signatures that are not None, in the same order; each changes the same residuals."""
+        return [cls(list(members), rig) for _, members in groupby(filter(None, signatures), attrgetter("rows"))]
 
     @cached_property
     def rows(self) -> RigRows:
-        """Columns of all groups, with their inner products."""
-        return RigRows(np.concatenate([group.scaled for group in self.groups]), self.rig, self.groups[0].rows.start)
+        """Scaled residual changes of all signatures, (g, rows)."""
+        scaled = np.concatenate([signature.scaled for signature in self.signatures])
+        return RigRows(scaled, self.rig, self.signatures[0].rows.start)
 
     @cached_property
     def batches(self) -> list[Batch]:
-        """Columns in blocks of equal width: a block for each group that acts together, and for every other column."""
+        """Blocks of columns, by width: one for each signature whose columns act together, one for each other column."""
         first, by_shape = 0, defaultdict[tuple[int, bytes], list[tuple[int, Array, int]]](list)
         units = dict[tuple[int, bytes], Array]()
-        for number, group in enumerate(self.groups):
-            rows = np.arange(first, first := first + len(group.columns))
-            unit = group.unit if group.act_together else np.eye(1)
-            blocks = rows[None] if group.act_together else rows[:, None]
+        for number, signature in enumerate(self.signatures):
+            rows = np.arange(first, first := first + len(signature.columns))
+            unit = signature.unit if signature.act_together else np.eye(1)
+            blocks = rows[None] if signature.act_together else rows[:, None]
             key = blocks.shape[1], unit.tobytes()
             units[key] = unit
-            by_shape[key] += [(number, block, group.sign) for block in blocks]
+            by_shape[key] += [(number, block, signature.sign) for block in blocks]
         arrays = [[np.array(values) for values in zip(*blocks, strict=True)] for blocks in by_shape.values()]
         return [
-            Batch(groups, columns, signs, unit)
-            for (groups, columns, signs), unit in zip(arrays, units.values(), strict=True)
+            Batch(signatures, columns, signs, unit)
+            for (signatures, columns, signs), unit in zip(arrays, units.values(), strict=True)
         ]
 
     @cached_property
     def _products_within(self) -> list[Array]:
-        """Inner products of the columns of each block, weighted by the scatter only, one array for each batch.
+        """Inner products of the columns of each block, weighted by the random noise only, one array for each batch.
 
-        Each array is (scatters, blocks, width, width): for each assumed scatter of the points and each block of `width`
-        columns.
+        Each array is (sizes, blocks, width, width): for each assumed size of the random noise.
         """
         by_batch = []
         for batch in self.batches:
             rows = self.rows.rows[batch.columns]
-            weights = self.rig.weights[0][:, self.groups[0].rows]
+            weights = self.rig.weights[0][:, self.signatures[0].rows]
             by_batch.append(np.array([rows * weight @ rows.swapaxes(-1, -2) for weight in weights]))
         return by_batch
 
     def within(self, combinations: Array) -> list[Array]:
-        """Inner products of the columns of each block for c assumed sizes of the rig's errors; results are kept.
+        """Inner products U^T S^-1 U of the columns of each block, S the covariance of noise and rig errors; cached.
+
+        Args:
+            combinations: indices of c combinations of sizes of the rig's errors, (c,).
 
         Returns:
             Products for each batch of blocks, (c, blocks, width, width).
@@ -226,10 +229,14 @@ class GroupSet:
         return [np.stack(arrays) for arrays in zip(*(self._within[n] for n in combinations.tolist()), strict=True)]
 
     def with_modes(self, compound: CompoundDeviation, combinations: Array) -> Array:
-        """Inner products of the rubber's deviation with all columns, for c sizes of the rig's errors; results are kept.
+        """Inner products of the modes of the rubber's deviation with all columns; cached.
+
+        Args:
+            compound: smooth deviation of the rubber, with q modes.
+            combinations: indices of c combinations of sizes of the rig's errors, (c,).
 
         Returns:
-            Products of the q modes of the deviation with the g columns of all groups, (c, q, g).
+            Products of the q modes of the deviation with the g columns of all signatures, (c, q, g).
         """
         keys = [(compound, n) for n in combinations.tolist()]
         if missing := [key for key in keys if key not in self._modes]:

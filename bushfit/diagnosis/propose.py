@@ -12,7 +12,7 @@ from itertools import compress, product
 
 import numpy as np
 
-from bushfit.diagnosis.explanations import Explanation, Group
+from bushfit.diagnosis.explanations import Explanation, Signature
 from bushfit.effects import Branch, Effect, effects_for_places, qualified_name, twins_of
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError, ModelError
@@ -34,15 +34,15 @@ _STEP = 1e-5
 class Proposal(Explanation):
     """Effect of the library that the model lacks, with the decrease of chi-square expected before any refit.
 
-    A shape parameter is a parameter of an effect other than its amount, such as the frequency of a resonance. The group
-    has one column for each set of shape parameters tried; it is None if the effect replaces a branch.
+    A shape parameter is a parameter of an effect other than its amount, such as the frequency of a resonance. The
+    signature has one column for each set of shape parameters tried; it is None if the effect replaces a branch.
 
     Args:
         model: model with the effect as a start for a refit: at the best shape parameters and zero amount (or the
             suggested amount if the amount is fitted in its logarithm). An effect that replaces a branch starts from
             values that the branch suggests.
         score: decrease of chi-square expected from the linearised model.
-        visible: True if the tests could distinguish the effect from a change of the model's parameters.
+        visible: True if the tests can distinguish the effect from a change of the model's parameters.
     """
 
     model: Model
@@ -85,11 +85,11 @@ def proposals(fit: FitResult, excluded: Collection[str], fixed: Sequence[str] | 
         suggested = float(np.clip(amounts[best] * amount.typical, *amount.bounds))
         shape = shapes[best] | ({qualified_name(effect, amount): suggested} if amount.log else {})
         model = fit.model.with_effect(effect.name, shape)
-        group = Group(columns, np.abs(columns * relative_noise).max(axis=1), act_together=False, sign=sign)
+        signature = Signature(columns, np.abs(columns * relative_noise).max(axis=1), act_together=False, sign=sign)
         ranked.append(
-            Proposal("effect", family, effect.name, group, model, float(gains[best]), visible=bool(visible.any()))
+            Proposal("effect", family, effect.name, signature, model, float(gains[best]), visible=bool(visible.any()))
         )
-    return sorted(ranked, key=lambda proposal: (-proposal.score, proposal.group is None))
+    return sorted(ranked, key=lambda proposal: (-proposal.score, proposal.signature is None))
 
 
 def scores(columns: Array, residual: Array, basis: Array) -> tuple[Array, Array, Array]:
@@ -101,8 +101,8 @@ def scores(columns: Array, residual: Array, basis: Array) -> tuple[Array, Array,
         basis: basis of the residuals that its parameters can absorb, from `parameter_basis`, (n, k).
 
     Returns:
-        Decrease of chi-square, best amount, and True for visible changes, (c,) each. Decrease and amount are 0 for
-        changes that the model's parameters absorb.
+        Decrease of chi-square, best amount, and a mask of the visible changes: those that parameters do not absorb,
+        (c,) each. Decrease and amount are 0 for the others.
     """
     lengths = np.linalg.norm(columns, axis=1)
     lengths = np.where(lengths > 0.0, lengths, 1.0)

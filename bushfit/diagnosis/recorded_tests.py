@@ -9,11 +9,11 @@ import numpy as np
 
 from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.claims import Claim
-from bushfit.diagnosis.explanations import Explanation, Group
+from bushfit.diagnosis.explanations import Explanation, Signature
 from bushfit.diagnosis.faulty_parts import FaultyPart, find_faulty_parts
-from bushfit.diagnosis.projected_columns import CompoundDeviation, GroupSet
+from bushfit.diagnosis.projected_columns import CompoundDeviation, SignatureSet
 from bushfit.diagnosis.rig_errors import RigErrors, in_scatter_units, rig_errors
-from bushfit.diagnosis.smooth_deviations import POWER_LAW, compound, power_laws, unnamed_curves
+from bushfit.diagnosis.smooth_deviations import POWER_LAW, compound_signature, power_laws, unnamed_curves
 from bushfit.effects.contract import Array
 from bushfit.effects.mistakes import USUAL_MODULUS
 from bushfit.fitting.problem import FitResult
@@ -29,8 +29,8 @@ class RecordedTests:
 
     Args:
         base: fit of the starting model; its residuals are whitened by scatter and by errors that points share.
-        bare: this fit with residuals in units of the scatter from point to point, to compare hypotheses; errors that
-            points share are not part of this unit.
+        bare: this fit with residuals divided by the random noise alone, to compare hypotheses on errors that points
+            share.
         rig: stated accuracy class of the rig (gain and phase errors).
         errors: errors of the rig that points share.
         deviation: changes of the residuals if the rubber deviates smoothly from the model's laws; None if the tests
@@ -44,7 +44,7 @@ class RecordedTests:
     bare: FitResult
     rig: RigSettings
     errors: RigErrors
-    deviation: Group | None
+    deviation: Signature | None
     log_odds: float = 0.0
     claim: Claim | None = None
     change: float = 0.0
@@ -63,11 +63,11 @@ class RecordedTests:
             change: largest relative change of a recorded quantity in the correction; 0 for the tests as recorded.
         """
         bare = in_scatter_units(base)
-        return cls(base, bare, rig, rig_errors(bare, rig), compound(bare), log_odds, claim, change)
+        return cls(base, bare, rig, rig_errors(bare, rig), compound_signature(bare), log_odds, claim, change)
 
     @cached_property
     def columns(self) -> ExplanationColumns:
-        """Changes of the residuals by faulty parts of the tests, smooth curves and a smooth deviation of the rubber."""
+        """Residual changes by faulty parts of the tests, smooth curves and a smooth deviation of the rubber."""
         return ExplanationColumns(self, self.errors)
 
     @cached_property
@@ -76,29 +76,26 @@ class RecordedTests:
         return [*find_faulty_parts(self.bare), *unnamed_curves(self.bare), *power_laws(self.bare)]
 
     @cached_property
-    def compound_in_fits(self) -> Group | None:
-        """Changes of the residuals by a smooth deviation of the rubber, in units of a fit's noise; None without any.
+    def compound_in_fits(self) -> Signature | None:
+        """Changes of the whitened residuals of a fit by a smooth deviation of the rubber; None without tests.
 
-        `deviation` has the same changes in units of the point-to-point scatter. A refit with an effect also estimates
-        their amounts, without a prior.
+        `deviation` has the same changes of residuals divided by random noise alone.
         """
-        return compound(self.base)
+        return compound_signature(self.base)
 
     @cached_property
     def faulty_parts_in_fits(self) -> dict[str, FaultyPart]:
-        """Faulty parts by name, with changes of the residuals in units of the noise of a fit, not of the scatter."""
+        """Faulty parts of the tests by name, with changes of the whitened residuals of a fit."""
         return {part.name: part for part in find_faulty_parts(self.base)}
 
 
 @dataclass(frozen=True, eq=False)
 class ExplanationColumns:
-    """Residual columns of the explanations of a gap other than effects, and of the rubber's smooth deviation.
-
-    The explanations are faulty parts of the tests and smooth curves. The deviation is a part of every hypothesis.
+    """Residual changes by faulty parts of the tests, by smooth curves and by the rubber's smooth deviation.
 
     Args:
         tests: tests whose gap is explained.
-        errors: errors of the rig, perhaps with further scatter of some points.
+        errors: errors of the rig, perhaps with additional independent errors of some points.
     """
 
     tests: RecordedTests
@@ -110,18 +107,18 @@ class ExplanationColumns:
         return CompoundDeviation(self.tests.deviation, self.errors) if self.tests.deviation else None
 
     @cached_property
-    def sets(self) -> list[GroupSet]:
-        """Residual columns of all explanations, in sets that change the same residuals."""
-        return GroupSet.split([e.group for e in self.tests.explanations if e.group], self.errors)
+    def sets(self) -> list[SignatureSet]:
+        """Signatures (residual changes) of all explanations, in sets that change the same residuals."""
+        return SignatureSet.split([e.signature for e in self.tests.explanations], self.errors)
 
     @cached_property
-    def curves(self) -> list[GroupSet]:
-        """Columns of the smooth curves."""
-        curves = [e.group for e in self.tests.explanations if e.group and e.kind == "unnamed" and e.family != POWER_LAW]
-        return GroupSet.split(curves, self.errors)
+    def curves(self) -> list[SignatureSet]:
+        """Signatures (residual changes) of the smooth curves, in sets that change the same residuals."""
+        curves = [e for e in self.tests.explanations if e.kind == "unnamed" and e.family != POWER_LAW]
+        return SignatureSet.split([curve.signature for curve in curves], self.errors)
 
     def with_variance(self, variance: Array) -> ExplanationColumns:
-        """Add independent errors of the residuals, of the given variances, (n,)."""
+        """Return the columns with an additional independent error of each residual, of the given variances, (n,)."""
         return replace(self, errors=replace(self.errors, variance=variance))
 
 

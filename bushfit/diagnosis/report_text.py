@@ -96,7 +96,7 @@ class DiagnosisWriter:
 
     def _named_diagnosis(self, first: Composition, closing: Closing) -> Diagnosis:
         """Diagnosis in which named effects explain the gap, or part of it with a description of the rest."""
-        names, base, fit, gap = self.finding.names, self.base, closing.certain, closing.gap
+        names, base, fit, gap = self.finding.names, self.base, closing.effects_fit, closing.gap
         verbs = ("closes", "explains") if len(names) == 1 else ("close", "explain")
         why = f"lowers chi-square by {base.chi_square - fit.chi_square:.0f}"
         why += " with the other named effects" * (len(names) > 1)
@@ -197,7 +197,7 @@ class DiagnosisWriter:
 
     @property
     def _candidates(self) -> list[Composition]:
-        """Reported explanations with causes that are probable, the most probable first."""
+        """Reported explanations that name an effect or a mistake and are probable, the most probable first."""
         return [c for c in self.finding.reported if c.probability > 1.0 - NAMED and c.causes]
 
     def _deciding_advice(self, leader: Composition) -> str:
@@ -264,7 +264,7 @@ class DiagnosisWriter:
             places: hypothesis whose faulty parts of the tests are reported; None without any.
             next_test: advice on the next test; "" for the usual confirmation of the first entry.
         """
-        search, base, after, gap = self.search, self.base, closing.fit, closing.gap
+        search, base, after, gap = self.search, self.base, closing.final_fit, closing.gap
         bounds, regions = search.data.bounds, find_regions(base)
         faulty_parts = places.faulty_parts if places else ()
         at_fault = [part.region(base.residual, places.change) for part in faulty_parts] if places else []
@@ -280,7 +280,7 @@ class DiagnosisWriter:
             lacking=self.finding.verdict == "ambiguous" or not (self.first and self.first.best.claim),
             corrected=gap.fitted if gap else None,
             rig=search.data.campaign.rig,
-            fixed=closing.known,
+            fixed=closing.fixed_amounts,
         )
         added = {name: value for name, value in fitted.model.values.items() if name not in base.model.values}
         ends = {name: end for name, value in added.items() if (end := get_parameter(name).reached_bound(value))}

@@ -26,10 +26,10 @@ _KNOWN = 30
 
 @dataclass(frozen=True)
 class NoiseCase:
-    """One assumption on the sizes of the rig's errors and of the rubber's smooth deviation from the model's laws.
+    """One combination of assumed sizes of the rig's errors and of the rubber's smooth deviation from the model's laws.
 
     Args:
-        scatter: standard deviation from point to point of a sweep, relative to its estimate.
+        scatter: factor on the estimated random noise from point to point of a sweep.
         errors: standard deviations of the errors of a run, of a level (all points at one constant amplitude or
             frequency), of drift along a run, and of a loop, relative to those of the rig's accuracy class.
         log_weight: natural log of the prior probability of the case.
@@ -46,14 +46,17 @@ class NoiseCase:
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """Rows of the residuals that share errors of the rig with each other only: a loop, or a level of a sweep.
+    """Residuals that share errors of the rig with each other only, with the changes that these errors cause.
+
+    A block contains the gains, or the phases, of a sweep at one constant amplitude or frequency (a level), or a loop
+    and its repeats.
 
     Args:
-        rows: indices of the rows in the residual vector, (n,).
-        columns: change of the whitened residuals due to each of w errors, at the gain and phase error that [rig] states
-            for the rig (its accuracy class), (w, n).
+        rows: indices of these residuals in the residual vector, (n,).
+        columns: change of the whitened residuals due to each of w errors of the size of the rig's accuracy class,
+            (w, n).
         kinds: kind of each error (run, level, drift or loop), (w,).
-        scatters: True for points of sweeps, whose scatter differs between noise cases; False for loops.
+        scatters: True for points of sweeps, whose random noise differs between noise cases; False for loops.
     """
 
     rows: Array
@@ -93,11 +96,12 @@ class RigErrors:
 
     @cached_property
     def combinations(self) -> tuple[Array, Array]:
-        """Distinct sizes of scatter and rig errors; cases that differ only in the rubber's deviation share one.
+        """Distinct combinations of sizes of random noise and rig errors, and the combination of each noise case.
 
         Returns:
-            Scatter, then the sizes of the errors of runs, levels, drift and loops, (combinations, 5); and the index of
-            the combination of each case, (cases,).
+            Factor on the random noise, then the sizes of the errors of runs, levels, drift and loops, (combinations,
+            5); and the index of the combination of each case, (cases,). Cases that differ only in the rubber's
+            deviation share a combination.
         """
         sizes = np.array([(case.scatter, *case.errors) for case in self.cases])
         distinct, index = np.unique(sizes, axis=0, return_inverse=True)
@@ -105,11 +109,11 @@ class RigErrors:
 
     @cached_property
     def weights(self) -> tuple[Array, Array]:
-        """Reciprocal variances of the residuals due to scatter alone, without the errors that points have in common.
+        """Reciprocal variances of the residuals due to random noise alone, without the errors that points share.
 
         Returns:
-            Values for each distinct scatter, (scatters, n); and the index of the scatter of each combination,
-            (combinations,).
+            Values for each distinct factor on the noise, (factors, n); and the index of the factor of each combination
+            of sizes, (combinations,).
         """
         scatters, index = np.unique(self.combinations[0][:, 0], return_inverse=True)
         variances = np.ones((scatters.size, self.variance.size))
@@ -147,7 +151,7 @@ class RigErrors:
 
 
 def in_scatter_units(fit: FitResult) -> FitResult:
-    """Express the residuals of a fit in units of the scatter from point to point alone, to compare hypotheses.
+    """Express the residuals of a fit in units of random noise (scatter from point to point), without shared errors.
 
     Residuals of sweeps are differences of ln K (gain and phase), because a difference relative to the measurement would
     make noise appear smaller where the model is wrong.
@@ -205,14 +209,15 @@ def noise_cases(fit: FitResult) -> list[NoiseCase]:
 
 
 def error_blocks(fit: FitResult, rig: RigSettings) -> Iterator[Block]:
-    """Divide the residuals into sets with errors in common: gains or phases of a sweep's level, or repeated loops.
+    """Divide the residuals of a fit into blocks that share errors of the rig.
 
     Args:
         fit: the fitted model and the tests.
         rig: stated accuracy class of the rig (gain and phase errors).
 
     Yields:
-        Blocks that together contain every row once.
+        Gains, then phases, of each sweep at each constant amplitude or frequency, then each loop with its repeats:
+        indices of the residuals, and their changes by the errors of the class; every residual is in one block.
     """
     loops, sweeps = split_by_kind(fit.data_sets)
     classes = class_errors(rig, ASSUMED)
@@ -235,7 +240,7 @@ def error_blocks(fit: FitResult, rig: RigSettings) -> Iterator[Block]:
 
 
 def _shared_errors(count: int, runs: Sequence[Array]) -> tuple[Array, Array]:
-    """Errors that the points of a level (one constant amplitude or frequency) share, at unit size.
+    """Values of the errors that points of a level (one constant amplitude or frequency) share, each of unit size.
 
     Args:
         count: number n of points.

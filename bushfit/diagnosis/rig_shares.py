@@ -28,7 +28,7 @@ _ITERATIONS = 3
 
 
 def with_alternatives(result: Result, hypotheses: Sequence[Hypothesis], base: FitResult, tolerance: float) -> Result:
-    """Add the models that the tests do not rule out beside the model of a result.
+    """Add models with other effects of the rig, which the tests do not rule out, to a result.
 
     Models with different effects of the rubber predict nearly the same in the tested range, because the rubber is the
     same in the car; the rig is not in the car. So hypotheses are grouped by their effects of the rig, and each group
@@ -50,11 +50,11 @@ def with_alternatives(result: Result, hypotheses: Sequence[Hypothesis], base: Fi
     members: dict[frozenset[str], list[Hypothesis]] = defaultdict(list)
     for hypothesis, share in zip(hypotheses, shares, strict=True):
         is_large = hypothesis.change > tolerance
-        effects = _of_rig(hypothesis.effects if is_large else ())
+        effects = _rig_effects(hypothesis.effects if is_large else ())
         probability[effects] += share
         if is_large and hypothesis.refitted and not hypothesis.claim:
             members[effects].append(hypothesis)
-    current = _of_rig(result.model.effects) - {*base.model.effects}
+    current = _rig_effects(result.model.effects) - {*base.model.effects}
     places = {str(test.direction): test.direction for test in base.data_sets}
     alternatives = []
     for effects, share in probability.items():
@@ -76,8 +76,8 @@ def with_alternatives(result: Result, hypotheses: Sequence[Hypothesis], base: Fi
     return replace(result, alternatives=tuple(alternatives))
 
 
-def _of_rig(names: Iterable[str]) -> frozenset[str]:
-    """Select the names of effects of the rig, and of effects with a twin in the rig."""
+def _rig_effects(names: Iterable[str]) -> frozenset[str]:
+    """Names of the effects of the rig among `names`, and of effects with a twin (an equal response) in the rig."""
     return frozenset(name for name in names if get_effect(name).twins or get_effect(name).level is Level.INSTRUMENT)
 
 
@@ -97,7 +97,7 @@ def _with_stiffness_of(measured: Model, model: Model, places: Mapping[str, Place
         patches = []
         for patch in unnamed.patches:
             place = places[patch.directions[0]]
-            ratio = _at_nodes(measured, patch, place) / _at_nodes(model, patch, place)
+            ratio = _node_stiffness(measured, patch, place) / _node_stiffness(model, patch, place)
             share = (1.0 + np.array(patch.in_phase) + 1j * np.array(patch.in_quadrature)) * ratio - 1.0
             in_phase, in_quadrature = (tuple(part.tolist()) for part in (share.real, share.imag))
             patches.append(replace(patch, in_phase=in_phase, in_quadrature=in_quadrature))
@@ -105,7 +105,7 @@ def _with_stiffness_of(measured: Model, model: Model, places: Mapping[str, Place
     return replace(model, unnamed=unnamed)
 
 
-def _at_nodes(model: Model, patch: Patch, place: Place) -> Array:
+def _node_stiffness(model: Model, patch: Patch, place: Place) -> Array:
     """Stiffness of a model at the nodes of a smooth correction [N/m or N m/rad], (m,)."""
     amplitude = np.array(patch.strain) / model.unit_strain(place)
     conditions = RubberConditions(np.array(patch.temperature_K) if patch.temperature_K else None)

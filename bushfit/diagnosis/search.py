@@ -18,13 +18,13 @@ from typing import NamedTuple
 import numpy as np
 
 from bushfit.diagnosis.claims import ClaimScreening, claims
+from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.explanations import Explanation
 from bushfit.diagnosis.faulty_parts import FaultyPart, OutlierCluster
 from bushfit.diagnosis.fits import fit_rivals, start_rivals
-from bushfit.diagnosis.group_evidence import GroupEvidence
 from bushfit.diagnosis.hypotheses import Hypothesis, SearchState
 from bushfit.diagnosis.priors import BEAM, DOES_NOT_FIT, LOG_ODDS_CUTOFF, NAMED, ODDS, REFITS, ROUNDS
-from bushfit.diagnosis.projected_columns import GroupSet
+from bushfit.diagnosis.projected_columns import SignatureSet
 from bushfit.diagnosis.propose import Proposal, has_used_parameters, proposals
 from bushfit.diagnosis.record import DiagnosisSettings
 from bushfit.diagnosis.recorded_tests import RecordedTests, modulus_deviation, record_change
@@ -50,17 +50,17 @@ _BENT = 1.5
 
 
 class _Step(NamedTuple):
-    """State of the search to extend.
+    """Fitted model of the search, with the explanations that may be added to it and their evidence.
 
     Args:
-        state: the state.
-        effects: effects that may be added, the highest score first.
-        evidence: further explanations of the gap, each with the evidence of the tests for it in the linear model.
+        state: fitted model with its explanations so far.
+        effects: effects that may be added, the highest expected decrease of chi-square first.
+        evidence: further explanations of the gap, each with the evidence for it by the linearised residuals.
     """
 
     state: SearchState
     effects: Sequence[Proposal]
-    evidence: Sequence[tuple[Explanation, GroupEvidence]]
+    evidence: Sequence[tuple[Explanation, Evidence]]
 
 
 @dataclass(eq=False)
@@ -117,18 +117,18 @@ class Search:
                     excluded = (*self.settings.without, *state.effects)
                     fixed = self.base.fixed if depth < ROUNDS else None  # the last round refits nothing
                     effects = self.proposals if state is self.root else proposals(state.bare, excluded, fixed)
-                groups = [effect.group for effect in effects if effect.group]
-                evidence = state.weigh([*GroupSet.split(groups, state.columns.errors), *state.columns.sets])
-                explanations = [*(effect for effect in effects if effect.group), *state.tests.explanations]
+                sets = SignatureSet.split([effect.signature for effect in effects], state.columns.errors)
+                evidence = state.weigh([*sets, *state.columns.sets])
+                explanations = [*(effect for effect in effects if effect.signature), *state.tests.explanations]
                 steps.append(_Step(state, effects, list(zip(explanations, evidence, strict=True))))
                 for explanation, of_explanation in steps[-1].evidence:
                     log_odds = self._log_odds(explanation.kind, explanation.name)
-                    self._note(state.extended(of_explanation, explanation, log_odds))
-            if depth == ROUNDS or self._is_sure():
+                    self._record(state.extended(of_explanation, explanation, log_odds))
+            if depth == ROUNDS or self._is_decided():
                 break
             fresh = list[SearchState]()
             for step in track("with one more", steps):
-                for grown in self._with_effects(step.state, self._promising(step, depth)):
+                for grown in self._with_effects(step.state, self._select_effects(step, depth)):
                     fresh += [grown, *self._without_earlier(grown)]
                 fresh += self._with_faulty_parts(step)
             fresh = self._with_common_start([*beam, *fresh])[len(beam) :]
@@ -159,8 +159,8 @@ class Search:
         """Hypotheses about the gap that the search has recorded so far, the most probable first."""
         return sorted(self._known.values(), key=lambda hypothesis: -hypothesis.log_posterior)
 
-    def _is_sure(self) -> bool:
-        """True if the search can stop: one explanation, or that nothing is missing, is nearly certain and fits."""
+    def _is_decided(self) -> bool:
+        """True if one hypothesis (one explanation, or that nothing is missing) is nearly certain and fits the tests."""
         finding = decide_verdict(self._ordered_hypotheses(), self.settings.tolerance)
         if finding.verdict == "consistent":
             return finding.nothing >= NAMED and self.root.linear.p_value() >= DOES_NOT_FIT
@@ -176,7 +176,7 @@ class Search:
         return is_power_law and finding.reported[0].probability >= NAMED and best.p_value >= DOES_NOT_FIT
 
     def _settle_linear(self) -> Iterator[Hypothesis]:
-        """Yield the most probable hypotheses that need a refit: their evidence is still that of the linear model."""
+        """Yield for a refit, one by one, the most probable hypotheses whose evidence is from the linear model."""
         for _ in range(_SETTLED):
             ordered = self._ordered_hypotheses()
             share = np.exp([hypothesis.log_posterior - ordered[0].log_posterior for hypothesis in ordered])
@@ -188,7 +188,7 @@ class Search:
             yield linear
 
     def _log_odds(self, kind: str, name: str) -> float:
-        """Natural log of the prior odds of one more explanation; the lowest odds of its kind if it has none of its own.
+        """Natural log of the prior odds of an explanation; if it is not listed, the lowest odds of its kind.
 
         Args:
             kind: kind of the explanation.
@@ -204,7 +204,7 @@ class Search:
         return self._log_priors[kind, name]
 
     def _is_improved(self, corrected: SearchState) -> bool:
-        """True if the correction of a recording mistake makes the same explanations more probable."""
+        """True if the same explanations are more probable with a recording mistake corrected than without."""
         assert corrected.tests.claim
         uncorrected = self._known.get(corrected.key - {corrected.tests.claim.key})
         return uncorrected is None or corrected.log_posterior > uncorrected.state.log_posterior
@@ -212,11 +212,11 @@ class Search:
     def _visit(self, state: SearchState) -> SearchState:
         """Record a state of the search (a fitted model) and its hypotheses, to visit it only once; return the state."""
         self._visited.add(state.key)
-        self._note(state.hypotheses)
+        self._record(state.hypotheses)
         return state
 
-    def _note(self, hypotheses: Sequence[Hypothesis]) -> None:
-        """Record hypotheses, each without and with a disturbance at each frequency where outliers were left out.
+    def _record(self, hypotheses: Sequence[Hypothesis]) -> None:
+        """Store hypotheses, each without and with a disturbance at each frequency where outliers were left out.
 
         Of two fits of the same set of explanations, a refit replaces a linear fit; otherwise the more probable fit
         stays.
@@ -235,7 +235,7 @@ class Search:
             if before is None or rank > (before.refitted, before.log_posterior):
                 self._known[candidate.key] = candidate
 
-    def _promising(self, step: _Step, depth: int) -> list[Proposal]:
+    def _select_effects(self, step: _Step, depth: int) -> list[Proposal]:
         """Select the effects to refit as additions to a state of the search.
 
         The effects with the highest evidence in the linearised model, and those with the largest expected decrease of
@@ -251,7 +251,7 @@ class Search:
         prior = {effect.name: self._log_odds("effect", effect.name) for effect in effects}
         base = state.log_weight - state.log_posterior
         gains = {e.name: base + prior[e.name] + evidence.total for e, evidence in step.evidence if e.name in prior}
-        first = sorted((effect for effect in effects if effect.group), key=lambda effect: -gains[effect.name])
+        first = sorted((effect for effect in effects if effect.signature), key=lambda effect: -gains[effect.name])
         first = [effect for effect in first[:by_evidence] if gains[effect.name] > -_SLIGHT]
         second = [effect for effect in effects if 0.5 * effect.score + prior[effect.name] > -_SLIGHT][:by_score]
         return list(dict.fromkeys([*first, *second]))
@@ -293,7 +293,7 @@ class Search:
             if state.key | {common.name} in self._visited:
                 continue
             parts = [common.in_form(form) for form in common.forms]
-            evidences = state.weigh([GroupSet([part.group for part in parts if part.group], state.columns.errors)])
+            evidences = state.weigh(SignatureSet.split([part.signature for part in parts], state.columns.errors))
             part, evidence = max(zip(parts, evidences, strict=True), key=lambda pair: pair[1].total)
             log_odds = self._log_odds("part", part.name)
             if state.log_weight + log_odds + evidence.total < state.log_posterior - _SLIGHT * is_bent:

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg import block_diag
 
-from bushfit.diagnosis.explanations import Explanation, Group
+from bushfit.diagnosis.explanations import Explanation, Signature
 from bushfit.effects.contract import Array
 from bushfit.fitting.discrepancy import COMPOUND_LENGTHS
 from bushfit.fitting.loop_harmonics import SMOOTH_HARMONICS
@@ -61,18 +61,18 @@ _PHASES = 32
 _STRAIN_ERROR, _STRAIN_STEP = 5.0, 1e-3
 
 
-def compound(fit: FitResult, count: int = _COMPOUND_PATTERNS) -> Group | None:
+def compound_signature(fit: FitResult, count: int = _COMPOUND_PATTERNS) -> Signature | None:
     """Changes of the residuals if the modulus of the rubber compound deviates smoothly from the model's laws.
 
-    The relative deviation is a random function of frequency and strain, the same in all directions and specimens.
+    The relative deviation is a Gaussian process over frequency and strain, the same in all directions and specimens.
 
     Args:
         fit: fitted model and tests.
         count: maximum number of patterns.
 
     Returns:
-        Group with one column for each independent pattern of the deviation (together of unit variance at each operating
-        point) and for each deviation of a loop's shape; None if the tests show no deviation.
+        Signature with one column for each independent pattern of the deviation (together of unit variance at each
+        operating point) and for each deviation of a loop's shape; None without tests.
     """
     if not fit.data_sets:
         return None
@@ -83,7 +83,7 @@ def compound(fit: FitResult, count: int = _COMPOUND_PATTERNS) -> Group | None:
         columns = np.concatenate((columns, _repeat_changes(fit, loops, compound_shapes)))
     unit = np.zeros((len(columns), changes.shape[-1]), dtype=complex)
     unit[: len(changes)] = changes
-    return Group(columns, unit, act_together=True)
+    return Signature(columns, unit, act_together=True)
 
 
 def _strain_changes(fit: FitResult) -> tuple[Array, Array]:
@@ -143,7 +143,7 @@ def _compound_correlation(points: Array, nodes: Array) -> Array:
 
 
 def compound_shapes(loop: MeasuredLoop) -> Array:
-    """Changes of a loop's shape (overtones of its force) if the rubber's stiffness deviates from the model by 100 %.
+    """Changes of a loop's residuals by the overtones of its force, if the rubber's stiffness deviates by 100 %.
 
     Returns:
         Changes of the loop's n whitened residuals for c independent deviations, one standard deviation each, (c, n).
@@ -178,7 +178,7 @@ def unnamed_curves(fit: FitResult) -> list[Explanation]:
         one explanation for the harmonics of all loops.
     """
     loops, sweeps = split_by_kind(fit.data_sets)
-    groups: dict[str, Group] = {}
+    curves: dict[str, Signature] = {}
     levels: dict[tuple[str, Hashable], list[MeasuredSweep]] = defaultdict(list)  # by direction and temperature
     for sweep in sweeps:
         kelvin = sweep.test.temperature
@@ -190,19 +190,19 @@ def unnamed_curves(fit: FitResult) -> list[Explanation]:
         directions[direction].append(points)
     for roughness, lengths in _CURVE_LENGTHS.items() if sweeps else ():
         columns, changes = _smooth_changes(fit, sweeps, lengths, **_CURVE_PATTERNS)
-        covered = fit.row_span(sweeps), fit.residual.size
+        span = fit.row_span(sweeps), fit.residual.size
         for direction, masks in directions.items():
             of_direction = np.concatenate([changes * points for points in masks])
-            of_rows = _residual_changes(fit, sweeps, of_direction)[:, covered[0]].copy()
-            groups[f"{roughness} {direction}"] = Group(of_rows, of_direction, act_together=True, covered_rows=covered)
+            of_rows = _residual_changes(fit, sweeps, of_direction)[:, span[0]].copy()
+            curves[f"{roughness} {direction}"] = Signature(of_rows, of_direction, act_together=True, covered_rows=span)
         if roughness == "rough" and len(directions) > 1:  # a smooth curve in all directions is the compound's
-            groups["rough all"] = Group(columns[:, covered[0]].copy(), changes, act_together=True, covered_rows=covered)
+            curves["rough all"] = Signature(columns[:, span[0]].copy(), changes, act_together=True, covered_rows=span)
     if loops:
         repeats = group_repeats(loops)
         shapes = block_diag(*[basis(np.arange(_PHASES) / _PHASES, SMOOTH_HARMONICS).T] * len(repeats))
-        columns = np.concatenate([_repeat_changes(fit, group, MeasuredLoop.smooth_changes) for group in repeats])
-        groups["loops"] = Group(columns, shapes, act_together=True)
-    return [Explanation("unnamed", name, name, group) for name, group in groups.items()]
+        columns = np.concatenate([_repeat_changes(fit, members, MeasuredLoop.smooth_changes) for members in repeats])
+        curves["loops"] = Signature(columns, shapes, act_together=True)
+    return [Explanation("unnamed", name, name, curve) for name, curve in curves.items()]
 
 
 def power_laws(fit: FitResult) -> list[Explanation]:
@@ -234,8 +234,8 @@ def power_laws(fit: FitResult) -> list[Explanation]:
         shapes /= np.abs(shapes).max(axis=1, keepdims=True)
         columns = _residual_changes(fit, tests, np.concatenate((shapes, 1j * shapes)))
         for (p, q), pair in zip(powers, columns.reshape(2, len(powers), -1).swapaxes(0, 1), strict=True):
-            group = Group(pair, np.array([[1.0], [1.0j]]), act_together=True)
-            explanations.append(Explanation("unnamed", POWER_LAW, f"f^{p} X^{q}, {scope}", group))
+            signature = Signature(pair, np.array([[1.0], [1.0j]]), act_together=True)
+            explanations.append(Explanation("unnamed", POWER_LAW, f"f^{p} X^{q}, {scope}", signature))
     return explanations
 
 
@@ -276,7 +276,7 @@ def _residual_changes(fit: FitResult, tests: Sequence[MeasuredTest], changes: Ar
 
 
 def _repeat_changes(fit: FitResult, loops: Sequence[MeasuredLoop], changes: Callable[[MeasuredLoop], Array]) -> Array:
-    """Changes of all n residuals due to force errors that repeats of a loop share.
+    """Changes of all n whitened residuals due to force errors that repeats of a loop share.
 
     Args:
         fit: fitted model and all tests.

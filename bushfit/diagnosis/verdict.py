@@ -55,7 +55,7 @@ class Composition:
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """Names of the mistake (as --adopt accepts it), effects, faults and nameless parts."""
+        """Names of all parts: recording mistake (as --adopt accepts it), effects, faults, smooth curves."""
         claim, faults = self.best.claim, (f"fault: {part.name}" for part in self.faulty_parts)
         return (*(claim.labels if claim else ()), *self.names, *faults, *self.nameless)
 
@@ -76,7 +76,7 @@ class Composition:
 
     @property
     def parts(self) -> frozenset[str]:
-        """Names of the effects, mistakes and kinds of faults of the explanation; "unnamed" for a smooth curve."""
+        """Names that identify the explanation: effects, mistake, kinds of faults, and "unnamed" for a smooth curve."""
         marks = [f"part: {part.family}" for part in self.faulty_parts] + ["levels"] * self.best.levels
         return frozenset((*self.causes, *marks, *["unnamed"] * self.unnamed))
 
@@ -179,13 +179,13 @@ def _verdict_on_parts(likely: Sequence[Composition], nothing: float, leads: Sequ
 
 
 def _leads(pairs: Sequence[tuple[Hypothesis, float]]) -> tuple[str, ...]:
-    """List the effects of the most probable hypothesis that are probable in all hypotheses together.
+    """Names of effects in the most probable hypothesis whose probability, over all hypotheses, is 90 % or more.
 
     Args:
         pairs: hypotheses and their posterior probabilities, the most probable first.
 
     Returns:
-        Names of effects in hypotheses with at least `LEAST_NAMED_SHARE` of the total probability.
+        Names; empty if there is no such effect.
     """
     share: dict[str, float] = defaultdict(float)
     for hypothesis, weight in pairs:
@@ -196,7 +196,7 @@ def _leads(pairs: Sequence[tuple[Hypothesis, float]]) -> tuple[str, ...]:
 
 
 def _parts_of(hypothesis: Hypothesis) -> frozenset[_Part]:
-    """List the parts of a hypothesis; hypotheses with equal parts are merged into one explanation.
+    """Kinds and names of the parts of a hypothesis; hypotheses with equal parts are merged into one explanation.
 
     Effects of the rubber are not listed if a deviation of the compound, or errors of levels, could imitate them. A
     deviation, a function of frequency and strain, cannot imitate effects of temperature and preload. A curve without a

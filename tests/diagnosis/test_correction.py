@@ -18,7 +18,7 @@ from test_schemas import complaints
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import RigSettings
-from bushfit.diagnosis.closing import GapDescription, describe
+from bushfit.diagnosis.closing import GapDescription, describe_gap
 from bushfit.diagnosis.fits import fit_model
 from bushfit.diagnosis.power_law import PowerLaw, nearest_power_law
 from bushfit.effects.contract import Array, Level
@@ -56,7 +56,7 @@ def evidence(measured, fitted) -> FitResult:
 
 @pytest.fixture(scope="module")
 def described(evidence) -> GapDescription:
-    found = describe(evidence, RigSettings(), evidence.model.values, {})
+    found = describe_gap(evidence, RigSettings(), evidence.model.values, {})
     assert found is not None
     return found
 
@@ -93,7 +93,7 @@ def test_held_out_tests_are_predicted_from_the_others(evidence, described):
     frequencies = np.unique(evidence.data_sets[0].frequency)
     third = frequencies[1:-1:3]
     rest = [test.without(np.flatnonzero(np.isin(test.frequency, third))) for test in evidence.data_sets]
-    other = describe(fit_model(evidence.model, rest, (), {}), RigSettings(), evidence.model.values, {})
+    other = describe_gap(fit_model(evidence.model, rest, (), {}), RigSettings(), evidence.model.values, {})
     residuals = [
         test.residual(other.after.model)[np.tile(np.isin(test.frequency, third), 2)] for test in evidence.data_sets
     ]
@@ -222,7 +222,7 @@ def found_in(campaign: Campaign, fitted: Fitted) -> PowerLaw:
 def test_laws_are_found_with_their_phase_and_powers(law, words, measured, fitted):
     """Of 3 % of the stiffness, each within three and a half standard errors, and called what they act like."""
     found = found_in(with_term(measured(), power_law(*law)), fitted)
-    assert found.measure == "stiffness"
+    assert found.quantity == "stiffness"
     assert found.is_likely
     for (value, low, high), true in zip(
         (found.phase_deg, found.frequency_power, found.amplitude_power), law[1:], strict=True

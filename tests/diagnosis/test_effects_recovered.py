@@ -112,13 +112,13 @@ def test_the_family_that_made_the_tests_is_the_best_and_known_to_be(paper_model,
     assert found[truth].probability > 0.5
     assert found[truth].holdout.after == pytest.approx(1.0, abs=0.05)
     if truth != "paper":
-        assert found[truth].words.endswith("better by more than chance")
+        assert found[truth].sentence.endswith("better by more than chance")
         values = found[truth].fit.model.values
         for key, value in TRUTHS[truth].items():
             assert values[f"{truth}.{key}"] == pytest.approx(value, rel=0.1)
     else:
-        assert "equal" in found["intrinsic_time"].words
-        assert found["kraus"].words.endswith("worse by more than chance")
+        assert "equal" in found["intrinsic_time"].sentence
+        assert found["kraus"].sentence.endswith("worse by more than chance")
 
 
 def test_the_interval_of_the_gain_grows_with_the_misfit(paper_model):

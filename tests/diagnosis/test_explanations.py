@@ -16,7 +16,7 @@ from bushfit.diagnosis.explanations import Explanation
 from bushfit.diagnosis.faulty_parts import find_faulty_parts, is_pattern
 from bushfit.diagnosis.hypotheses import SearchState, mean_parameters
 from bushfit.diagnosis.linear_model import LinearModel
-from bushfit.diagnosis.projected_columns import GroupSet
+from bushfit.diagnosis.projected_columns import SignatureSet
 from bushfit.diagnosis.propose import proposals
 from bushfit.diagnosis.recorded_tests import RecordedTests
 from bushfit.diagnosis.rig_errors import in_scatter_units, rig_errors
@@ -31,13 +31,13 @@ SHARED_RIG = RigSettings(gain_error=4e-3, phase_error=3.5e-3)
 
 def best(evidence: FitResult, every: Sequence[Explanation]) -> Explanation:
     """The one that makes the tests likeliest."""
-    known = [each for each in every if each.group]
-    groups = [each.group for each in known if each.group]
+    known = [each for each in every if each.signature]
+    signatures = [each.signature for each in known if each.signature]
     rig = rig_errors(evidence, SHARED_RIG)
     solution = evidence
     precision = np.zeros(len(solution.jacobian))
-    worths = LinearModel(solution.residual, solution.jacobian, precision, rig).group_evidence(
-        GroupSet.split(groups, rig)
+    worths = LinearModel(solution.residual, solution.jacobian, precision, rig).explanation_evidence(
+        SignatureSet.split(signatures, rig)
     )
     return max(zip(known, worths, strict=True), key=lambda pair: pair[1].log_evidence)[0]
 

@@ -1,4 +1,4 @@
-"""The evidence of groups of columns is that of integrals done outright."""
+"""The evidence of signatures of columns is that of integrals done outright."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -8,10 +8,10 @@ import pytest
 from scipy.special import logsumexp
 from scipy.stats import multivariate_normal, norm
 
-from bushfit.diagnosis.explanations import Group
+from bushfit.diagnosis.explanations import Signature
 from bushfit.diagnosis.linear_model import LinearModel
 from bushfit.diagnosis.priors import SIZES
-from bushfit.diagnosis.projected_columns import CompoundDeviation, GroupSet
+from bushfit.diagnosis.projected_columns import CompoundDeviation, SignatureSet
 from bushfit.diagnosis.rig_errors import Block, NoiseCase, RigErrors
 from bushfit.effects.contract import Array
 
@@ -23,9 +23,9 @@ CASES = (
 )
 
 
-def ledger(seed: int, *, flat: int = 2, known: int = 1, rows: int = 10) -> tuple[LinearModel, GroupSet]:
+def ledger(seed: int, *, flat: int = 2, known: int = 1, rows: int = 10) -> tuple[LinearModel, SignatureSet]:
     """Random numbers of everything: two blocks of which one scatters, rows in none, rows with a variance of their own,
-    and a group of each sort."""
+    and a signature of each sort."""
     random = np.random.default_rng(seed)
     blocks = (
         Block(np.array([6, 0, 3]), random.normal(size=(3, 3)), np.array([0, 1, 1]), scatters=True),
@@ -34,16 +34,16 @@ def ledger(seed: int, *, flat: int = 2, known: int = 1, rows: int = 10) -> tuple
     columns = 10.0 * random.normal(size=(9, rows))
     share = random.uniform(0.2, 2.0, size=9)
     made = (
-        Group(columns[:2], np.eye(2), act_together=True),
-        Group(columns[2:4], np.eye(2), act_together=True),
-        Group(columns[4:7], share[4:7], act_together=False),
-        Group(columns[7:9], share[7:9], act_together=False, sign=1),
-        Group(columns[:3], np.eye(3), act_together=True),
+        Signature(columns[:2], np.eye(2), act_together=True),
+        Signature(columns[2:4], np.eye(2), act_together=True),
+        Signature(columns[4:7], share[4:7], act_together=False),
+        Signature(columns[7:9], share[7:9], act_together=False, sign=1),
+        Signature(columns[:3], np.eye(3), act_together=True),
     )
     precision = np.repeat([0.0, 0.5], [flat, known])
     jacobian = random.normal(size=(flat + known, rows))
     rig = RigErrors(blocks, CASES, np.where(np.arange(rows) % 3, 0.0, 0.7))
-    return LinearModel(3.0 * random.normal(size=rows), jacobian, precision, rig), GroupSet(made, rig)
+    return LinearModel(3.0 * random.normal(size=rows), jacobian, precision, rig), SignatureSet(made, rig)
 
 
 def covariance(of: LinearModel, node: NoiseCase) -> Array:
@@ -79,17 +79,17 @@ def over_nodes(of: LinearModel, values: Sequence[float], *, wide: bool = False) 
 def test_worth_is_that_of_the_covariance_in_full(seed):
     """Of the rig and the parameters; and beside them of columns that move together, and of those of which one is
     chosen, over all sizes and nodes."""
-    of, groups = ledger(seed)
+    of, signatures = ledger(seed)
     plain = [restricted(of, covariance(of, node)) for node in of.rig.cases]
     assert of.evidence.log_evidence == pytest.approx(over_nodes(of, plain), abs=1e-6)
     assert of.log_evidence_with_level_errors == pytest.approx(over_nodes(of, plain, wide=True), abs=1e-6)
-    for group, worth in zip(groups.groups, of.group_evidence([groups]), strict=True):
-        if group.sign:
+    for signature, worth in zip(signatures.signatures, of.explanation_evidence([signatures]), strict=True):
+        if signature.sign:
             continue
         parts = (
-            [group.columns]
-            if group.act_together
-            else [column[None] / unit for column, unit in zip(group.columns, group.unit, strict=True)]
+            [signature.columns]
+            if signature.act_together
+            else [column[None] / unit for column, unit in zip(signature.columns, signature.unit, strict=True)]
         )
         cases = [size * part for size in SIZES for part in parts]
         by_node = [
@@ -101,10 +101,10 @@ def test_worth_is_that_of_the_covariance_in_full(seed):
 @pytest.mark.parametrize("sense", [1, -1, 0])
 def test_an_amount_is_integrated_over_its_sense(sense):
     """Numerically, and the free parameter with it: where an effect is missing, the model stays below the tests."""
-    of, groups = ledger(4, flat=1, known=0)
-    column, unit, own = groups.groups[0].columns[0], 0.7, of.jacobian[0]
-    group = Group(column[None], np.array([unit]), act_together=False, sign=sense)
-    (evidence,) = of.group_evidence([GroupSet((group,), of.rig)], np.array([0]))
+    of, signatures = ledger(4, flat=1, known=0)
+    column, unit, own = signatures.signatures[0].columns[0], 0.7, of.jacobian[0]
+    signature = Signature(column[None], np.array([unit]), act_together=False, sign=sense)
+    (evidence,) = of.explanation_evidence([SignatureSet((signature,), of.rig)], np.array([0]))
     noise, spreads = multivariate_normal(cov=covariance(of, CASES[0])), SIZES / unit
     low, high = {1: (0.0, 1.0), -1: (-1.0, 0.0), 0: (-1.0, 1.0)}[sense]
     x, weight = np.polynomial.legendre.leggauss(300)
@@ -120,15 +120,15 @@ def test_an_amount_is_integrated_over_its_sense(sense):
 
 @pytest.mark.parametrize("seed", range(3))
 def test_a_deviation_of_the_compound_is_part_of_the_covariance(seed):
-    """At every node of some size, beside nothing more and beside a group; at the others there is none."""
-    plain, groups = ledger(seed)
+    """At every node of some size, beside nothing more and beside a signature; at the others there is none."""
+    plain, signatures = ledger(seed)
     columns = np.random.default_rng(seed).normal(size=(2, plain.residual.size))
     sizes = (0.0, 0.3, 0.7)
     nodes = [replace(node, compound=size) for node in CASES[:2] for size in sizes]
     rig = replace(plain.rig, cases=nodes)
-    compound = CompoundDeviation(Group(columns, np.eye(2), act_together=True), rig)
+    compound = CompoundDeviation(Signature(columns, np.eye(2), act_together=True), rig)
     of = replace(plain, rig=rig, compound=compound)
-    group, size = groups.groups[0].columns, SIZES[:, None, None]
+    signature, size = signatures.signatures[0].columns, SIZES[:, None, None]
 
     def evidence(bent: bool, added: Array) -> float:
         own = [node for node in nodes if (node.compound > 0.0) is bent]
@@ -138,8 +138,8 @@ def test_a_deviation_of_the_compound_is_part_of_the_covariance(seed):
     nothing = np.zeros((of.residual.size, of.residual.size))
     assert of.evidence.log_evidence == pytest.approx(evidence(False, nothing), abs=1e-6)
     assert of.evidence.with_compound.log_evidence == pytest.approx(evidence(True, nothing), abs=1e-6)
-    added = size**2 * (group.T @ group)
-    worth = of.group_evidence([GroupSet(groups.groups, rig)])[0]
+    added = size**2 * (signature.T @ signature)
+    worth = of.explanation_evidence([SignatureSet(signatures.signatures, rig)])[0]
     for bent, found in (
         (False, worth.log_evidence),
         (True, worth.with_compound.log_evidence if worth.with_compound else 0.0),
@@ -149,8 +149,8 @@ def test_a_deviation_of_the_compound_is_part_of_the_covariance(seed):
 
 
 def test_evidence_does_not_depend_on_a_triangle_on_which_lapack_fails(monkeypatch):
-    linear, groups = ledger(3)
-    expected, decompose = linear.group_evidence([groups])[0].log_evidence, np.linalg.eigh
+    linear, signatures = ledger(3)
+    expected, decompose = linear.explanation_evidence([signatures])[0].log_evidence, np.linalg.eigh
 
     def fails(matrix: Array, UPLO: str = "L") -> tuple[Array, Array]:
         if matrix.ndim == 4 and UPLO == "L":
@@ -158,4 +158,4 @@ def test_evidence_does_not_depend_on_a_triangle_on_which_lapack_fails(monkeypatc
         return decompose(matrix, UPLO)
 
     monkeypatch.setattr(np.linalg, "eigh", fails)
-    assert linear.group_evidence([groups])[0].log_evidence == pytest.approx(expected, rel=1e-12)
+    assert linear.explanation_evidence([signatures])[0].log_evidence == pytest.approx(expected, rel=1e-12)

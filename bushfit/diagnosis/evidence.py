@@ -16,14 +16,14 @@ from bushfit.effects.contract import Array
 
 
 @dataclass(frozen=True, eq=False)
-class GroupEvidence:
+class Evidence:
     """Evidence of the tests for one explanation of a gap.
 
     Args:
         log_evidence: natural log of the marginal likelihood of the tests with the explanation, averaged over the sizes
             of its amounts and of the rig's errors.
-        size: relative change of |K| due to the explanation, root mean square over the posterior.
-        likeliest: most probable prior standard deviation of the amounts, relative to |K|, one of `priors.SIZES`.
+        size: largest relative change of |K| due to the explanation, root mean square over the posterior.
+        likeliest: most probable of seven prior standard deviations, 0.4 to 40 % of |K|, of the explanation's amounts.
         with_compound: evidence for the explanation together with a smooth deviation of the rubber from the model's
             laws; None if no such deviation is considered.
     """
@@ -31,7 +31,7 @@ class GroupEvidence:
     log_evidence: float
     size: float
     likeliest: float
-    with_compound: GroupEvidence | None = None
+    with_compound: Evidence | None = None
 
     @property
     def total(self) -> float:
@@ -42,16 +42,17 @@ class GroupEvidence:
 
 
 def posterior(gram: Array, projections: Array) -> tuple[Array, Array, Array, Array]:
-    """Posterior of the amounts of columns that act together, for each prior size in `priors.SIZES`.
+    """Posterior of the amounts (coefficients) of residual changes that act together, for each of seven prior sizes.
 
     Args:
-        gram: inner products U^T P U of the columns U; P is the inverse covariance of the residuals r with the model's
-            parameters projected out, (..., width, width).
+        gram: inner products U^T P U of the residual changes U per unit amount, as columns; P is the inverse covariance
+            of the residuals r with the model's parameters projected out, (..., width, width).
         projections: inner products U^T P r of the columns with the residuals, (..., width).
 
     Returns:
-        Increase of the log evidence by the columns, (..., sizes); mean amounts, (..., sizes, width); variances along
-        the eigenvectors of `gram`, (..., sizes, width); and these eigenvectors, (..., width, width).
+        For normal amounts of each standard deviation in `priors.SIZES`, 0.4 to 40 % of |K|: increase of the log
+        evidence by the columns, (..., sizes); mean amounts, (..., sizes, width); variances along the eigenvectors of
+        `gram`, (..., sizes, width). Then these eigenvectors, (..., width, width).
     """
     if gram.shape[-1] == 1:
         values, vectors = gram[..., 0], np.ones_like(gram)
@@ -69,14 +70,14 @@ def posterior(gram: Array, projections: Array) -> tuple[Array, Array, Array, Arr
 
 
 def largest_gain(gram: Array, projections: Array) -> Array:
-    """Largest increase of the log evidence by columns that act together, over the prior sizes `priors.SIZES`.
+    """Largest increase of the log evidence by residual changes that act together, over seven prior sizes of amounts.
 
     Args:
         gram: inner products U^T P U of the columns U, see `posterior`, (..., width, width).
         projections: inner products U^T P r with the residuals, (..., width).
 
     Returns:
-        Largest gains, (...).
+        Largest increase over the standard deviations in `priors.SIZES`, 0.4 to 40 % of |K|, (...).
 
     Notes:
         The last row of the Cholesky factor of [[1 + v^2 U^T P U, v U^T P r], [., c]] has the squared norm v^2 r^T P U
@@ -104,7 +105,7 @@ def block_gains(batch: Batch, projections: Array, gram: Array) -> tuple[Array, A
         gram: inner products U^T P U of the columns of each block, (cases, blocks, width, width).
 
     Returns:
-        Gains and squared changes for each of `priors.SIZES`, (cases, blocks, sizes) each.
+        Increases and squared changes for each standard deviation in `priors.SIZES`, (cases, blocks, sizes) each.
     """
     gain, amounts, variances, _ = posterior(gram, projections)
     if (signs := batch.signs[:, None]).any():
@@ -113,19 +114,19 @@ def block_gains(batch: Batch, projections: Array, gram: Array) -> tuple[Array, A
     return gain, np.square(np.abs(amounts @ batch.unit)).max(axis=-1)
 
 
-def average(groups: Array, log_evidence: Array, changes: Array) -> dict[int, GroupEvidence]:
-    """Average the evidence of each explanation (group) over sizes of rig errors, its alternatives and amounts.
+def mean_evidence(signatures: Array, log_evidence: Array, changes: Array) -> dict[int, Evidence]:
+    """Average the evidence of each explanation over noise cases, its alternative blocks and the sizes of its amounts.
 
     Args:
-        groups: index of the group of each block, ascending, (blocks,).
+        signatures: index of the explanation of each block (columns that act together), ascending, (blocks,).
         log_evidence: natural log of prior weight times evidence, (cases, blocks, sizes).
         changes: squared relative change of |K|, (cases, blocks, sizes).
 
     Returns:
-        Evidence by the index of the group.
+        Evidence by the index of the explanation.
     """
-    first = np.flatnonzero(np.diff(groups, prepend=-1))
-    blocks = np.diff(first, append=len(groups))
+    first = np.flatnonzero(np.diff(signatures, prepend=-1))
+    blocks = np.diff(first, append=len(signatures))
     highest = np.maximum.reduceat(np.max(log_evidence, axis=(0, 2), initial=-np.inf), first)
     share = np.exp(log_evidence - np.repeat(highest, blocks)[:, None])
     by_size = np.add.reduceat(share.sum(axis=0), first, axis=0)
@@ -134,4 +135,4 @@ def average(groups: Array, log_evidence: Array, changes: Array) -> dict[int, Gro
     likeliest = SIZES[np.argmax(by_size, axis=1)]
     values = (highest + np.log(total / (blocks * SIZES.size)), np.sqrt(squares), likeliest)
     triples = zip(*(value.tolist() for value in values), strict=True)
-    return {n: GroupEvidence(*triple) for n, triple in zip(groups[first].tolist(), triples, strict=True)}
+    return {n: Evidence(*triple) for n, triple in zip(signatures[first].tolist(), triples, strict=True)}
