@@ -74,7 +74,7 @@ class _Element(NamedTuple):
     damping: Mapping[Kind, float]
 
     def error(self, kind: Kind) -> Caveat:
-        """Describe the errors of |K| and loss factor that a single static curve and damping cause over the grid.
+        """Make a warning on the errors of |K| and loss factor that one static curve and damping cause on the grid.
 
         Args:
             kind: "car" for Adams Car, "ride" for Adams Car Ride.

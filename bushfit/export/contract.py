@@ -171,7 +171,7 @@ class ExportRequest:
 
     @property
     def conditions(self) -> RubberConditions:
-        """Temperature of the rubber at which the model is exported."""
+        """Conditions of the rubber in the exported files: its temperature, without preload and history."""
         return RubberConditions(self.temperature)
 
     @property

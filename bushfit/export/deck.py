@@ -219,14 +219,14 @@ def format_real(value: float, digits: int = 5) -> str:
 
 
 def table_omissions(request: ExportRequest, form: StiffnessForm) -> Iterator[Caveat]:
-    """Generate the omissions of a deck with linear tables over frequency, one set for each amplitude.
+    """Generate warnings on what a deck with linear tables over frequency, one set per amplitude, cannot represent.
 
     Args:
         request: model, predictions and settings.
         form: conversion of the complex stiffness to the quantities that the solver interpolates.
 
     Yields:
-        Omissions with the errors of |K|; those of a single direction come first.
+        Warnings with the errors of |K|; those on a single direction come first.
     """
     model = request.result.model.without(EffectLevel.INSTRUMENT)
     for prediction in exported_directions(request):
@@ -258,13 +258,13 @@ def table_omissions(request: ExportRequest, form: StiffnessForm) -> Iterator[Cav
 
 
 def common_omissions(request: ExportRequest) -> Iterator[Caveat]:
-    """Yield what every deck omits.
+    """Yield warnings on the properties of a model that no deck can represent.
 
     Args:
         request: model and directions to export.
 
     Yields:
-        Limits of the time domain, of the coupling of directions, and motions that the model lacks.
+        Warnings on the time domain, the coupling of directions, motions that the model lacks, and specimens.
     """
     yield NO_LOOPS
     omit = partial(Caveat, "format_omission")
@@ -284,13 +284,14 @@ def common_omissions(request: ExportRequest) -> Iterator[Caveat]:
 
 
 def band_omissions(prediction: Prediction) -> Iterator[Caveat]:
-    """Yield what a deck omits of a prediction.
+    """Yield warnings on the uncertainty of a prediction, which a deck omits: it contains the predicted values alone.
 
     Args:
         prediction: predicted stiffness of one direction.
 
     Yields:
-        Width of the 95 % band, and the change of |K| if an unresolved effect belongs to the rig.
+        Largest half width of the 95 % band of |K| [%]; and, if the tests cannot tell whether an effect belongs to the
+        bushing or to the rig, the change of |K| in case it belongs to the rig.
     """
     place, band = prediction.direction, prediction.stiffness
     if (width := float(np.max((band.high - band.low) / (2.0 * band.value)))) > 0.0:

@@ -189,6 +189,9 @@ def _fields(model: Model, place: Place, names: Mapping[str, str], arms: tuple[Ar
         place: direction or specimen.
         names: name of the FMU value of each parameter.
         arms: Maxwell arms that replace viscoelastic effects.
+
+    Returns:
+        Name of the FMU value by field, such as {"unit_strain": "unit_strain.axial", "size[0]": "m"}.
     """
     fields = {key: names[key] for key in ("unit_strain", "stiffness_per_modulus")}
     fields |= {f"size[{index}]": names[part.size] for index, part in enumerate(arms)}
@@ -203,7 +206,7 @@ def _fields(model: Model, place: Place, names: Mapping[str, str], arms: tuple[Ar
 def _steady_omissions(
     model: Model, omitted: list[str], prediction: Prediction, conditions: RubberConditions
 ) -> Iterator[Caveat]:
-    """Generate the error of |K| in an FMU in which effects are omitted or kept constant; nothing without an error.
+    """Yield a warning on the error of |K| in an FMU that omits effects or keeps them constant; none without an error.
 
     Args:
         model: model in the export, without effects of the rig.

@@ -43,7 +43,7 @@ _DIALECTS = {
 
 
 def export(request: ExportRequest) -> Exported:
-    """Write the properties of the bushing as bulk data of Nastran or OptiStruct, without elements.
+    """Write one bushing property (PBUSH with its tables) per amplitude as bulk data of Nastran or OptiStruct.
 
     Args:
         request: model, predictions and settings.
@@ -64,14 +64,18 @@ def export(request: ExportRequest) -> Exported:
 def _property(
     names: Sequence[str], form: StiffnessForm, units: UnitSystem, pid: int, level: AmplitudeLevel
 ) -> Iterator[str]:
-    """Yield the lines of PBUSH, PBUSHT and the tables of one amplitude.
+    """Yield the bulk data lines of the bushing property (card PBUSH) at one amplitude, with its frequency tables.
 
     Args:
-        names: names of the tables in the property, for stiffness and damping.
-        form: conversion of the complex stiffness to these two quantities.
+        names: keywords of stiffness and damping in the cards: "K" and "GE", in OptiStruct "KMAG" and "ANGLE".
+        form: conversion of the complex stiffness to the quantities of these keywords.
         units: unit system of the deck.
-        pid: property number.
-        level: stiffness of all directions at this amplitude.
+        pid: number of the property.
+        level: stiffness tables of all directions at this amplitude.
+
+    Yields:
+        PBUSH with the values at the lowest frequency; for several frequencies also PBUSHT, which refers to the tables,
+        and a card TABLED1 for each degree of freedom and keyword.
     """
     columns = {dof: form.in_units(table, units) for dof, table in by_dof(level)}
     numbers = {(dof, part): str(_TABLES * pid + 10 * part + dof) for dof in columns for part in (0, 1)}

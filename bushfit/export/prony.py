@@ -44,7 +44,7 @@ class PronySeries:
         strain: engineering shear strain amplitude at which the series holds.
         long_term: modulus at rest G_inf [Pa].
         arms: the terms, as Maxwell arms in parallel with G_inf.
-        exact: complex modulus of the model at frequencies over the band [Pa].
+        exact: complex modulus of the model at frequencies over the band [Pa], (n,).
         instantaneous: instantaneous modulus G_0 [Pa], the sum of the moduli of all terms and G_inf.
         relative_moduli: modulus of each of the k terms relative to G_0, g_i, (k,).
     """
@@ -101,7 +101,7 @@ def prony_series(request: ExportRequest) -> list[PronySeries]:
 
 
 def prony_omissions(series: Sequence[PronySeries]) -> Iterator[Caveat]:
-    """Yield the limits of Prony series.
+    """Yield warnings on the accuracy and the validity of Prony series.
 
     Args:
         series: Prony series at increasing strain amplitudes.

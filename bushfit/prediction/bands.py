@@ -73,14 +73,14 @@ def car_models(model: Model, unresolved: Sequence[str]) -> list[Model]:
 
 
 def alternative_models(result: Result, *, rig: bool) -> Iterator[tuple[Result, Model]]:
-    """Yield the other models that the tests do not rule out, with or without the effects of the rig.
-
-    Yields:
-        The result with the parameter errors of the alternative and without a model error; and the alternative model.
+    """Yield the alternatives that a diagnosis could not distinguish from the fitted model.
 
     Args:
         result: fitted result.
         rig: True to keep the effects of the rig, as in the tests; False for the models of `car_models`.
+
+    Yields:
+        The result with the parameter errors of the alternative and without a model error; and the alternative model.
     """
     resolved = {*result.model.effects} - {*result.unresolved}
     for other in result.alternatives:
@@ -97,7 +97,8 @@ def candidates(result: Result, *, rig: bool = False) -> list[tuple[Result, Model
         rig: True to include the effects of the rig, as in the tests.
 
     Returns:
-        Pairs of a model and the result that contains its errors: `car_models`, then `alternative_models`.
+        Pairs of the result that contains the errors and the model: the fitted model with every subset of the effects
+        that belong either to bushing or rig, then the alternatives of the diagnosis.
     """
     models = [result.model] if rig else car_models(result.model, result.unresolved)
     return [*((result, model) for model in models), *alternative_models(result, rig=rig)]

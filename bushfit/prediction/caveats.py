@@ -116,7 +116,7 @@ def unfitted_warnings(result: Result, direction: Place) -> Iterator[Caveat]:
             error = _radial_error(bushing)
             sentence = f"fitted with the paper's formula, {error}. The parameters contain this error"
             yield Caveat("formula_error", sentence).about(direction)
-            yield from _compressible(result, bushing, direction)
+            yield from _compressibility_warning(result, bushing, direction)
         return
     of_bushing = direction.axis is Direction.AXIAL and Direction.AXIAL not in axes and not axes.isdisjoint(Direction)
     if not (of_bushing or direction.axis in (Direction.RADIAL, Direction.TORSION)):
@@ -142,10 +142,10 @@ def unfitted_warnings(result: Result, direction: Place) -> Iterator[Caveat]:
     sentence = f"not fitted, predicted from the {tests} tests{agreement}. {band}, {error}"
     yield Caveat(kind, sentence).about(direction)
     if radially and bushing:
-        yield from _compressible(result, bushing, direction)
+        yield from _compressibility_warning(result, bushing, direction)
 
 
-def _compressible(result: Result, bushing: Bushing, direction: Place) -> Iterator[Caveat]:
+def _compressibility_warning(result: Result, bushing: Bushing, direction: Place) -> Iterator[Caveat]:
     """Yield a warning if a bulk modulus of 2 GPa would lower the radial stiffness by more than 1 %."""
     place = direction if direction.axis is Direction.RADIAL else Direction.RADIAL
     decrease = bushing.correction.stiffness_decrease(result.model.values.get("mu", 0.0)) if bushing.correction else 0.0

@@ -222,7 +222,7 @@ def with_model_patterns(result: Result, predictions: Sequence[Prediction]) -> li
 
 
 def _distance_from_zero(band: Band) -> Array:
-    """Distance of each value from zero, over the half width of its band on that side, (n,); 0 for a value of zero."""
+    """Distance of each value from zero, divided by the half width of its band on the side of zero, (n,)."""
     half = np.where(band.value > 0.0, band.value - band.low, band.high - band.value)
     with np.errstate(divide="ignore"):
         return np.abs(band.value) / np.where(band.value == 0.0, 1.0, half)

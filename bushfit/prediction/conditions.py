@@ -37,7 +37,7 @@ class PredictedPlace:
 
     Attributes:
         direction: direction or specimen.
-        conditions: temperature and preload, as of `rubber_conditions`.
+        conditions: temperature [K] and preload of the rubber; None for a condition that the model does not depend on.
     """
 
     direction: Place
@@ -59,13 +59,13 @@ class PredictedPlace:
 def rubber_conditions(
     result: Result, place: Place, temperature: float | None = None, preload: Preload | None = None
 ) -> RubberConditions:
-    """Temperature and preload of a prediction; None in place of a condition on which the model does not depend.
+    """Temperature [K] and preload of a prediction; None for a condition that the model does not depend on.
 
     Args:
         result: fitted result.
         place: direction or specimen.
         temperature: temperature [K]; None for the reference temperature.
-        preload: requested preload, as of `tested_preload`.
+        preload: requested preload, within the tested range; None for the tested preload nearest to zero.
     """
     kelvin = (REFERENCE if temperature is None else temperature) if "temperature" in result.model.depends_on else None
     return RubberConditions(kelvin, preload=tested_preload(result, place, preload))

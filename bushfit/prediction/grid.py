@@ -1,4 +1,4 @@
-"""Grids of a prediction: requested, measured, or the paper's grid within the measured range."""
+"""Grids of a prediction: requested, measured, or that of Garcia Tarrago et al. 2007 within the measured range."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -89,7 +89,7 @@ def grid_settings(options: Mapping[str, object], campaign: Campaign | None = Non
     """Settings of a prediction: the given options, else the [predict] table of a campaign, else None for the default.
 
     Args:
-        options: directions and operating points, as of `GridOptions`.
+        options: directions and operating points by the keys of `GridOptions`, such as {"frequencies": [20.0, 50.0]}.
         campaign: campaign; None without one.
 
     Returns:
@@ -108,8 +108,8 @@ def default_grid(result: Result, direction: Place, sweeps: Sequence[Sweep] = ())
     """Choose the frequencies and amplitudes of a prediction for which the user requests none.
 
     The first available of: the operating points of the sweeps (one value per level, and at most ten values over a range
-    without levels); the points of the tests in the model file; the paper's grid within the measured range; a few values
-    over the measured range.
+    without levels); the points of the tests in the model file; the grid of Garcia Tarrago et al. 2007 (5 to 155 Hz;
+    0.1, 0.2 and 0.5 mm, or similar strains) within the measured range; a few values over the measured range.
 
     Args:
         result: fitted result.

@@ -52,13 +52,13 @@ def predict_each_bushing(
         points = [misfit.points for misfit in misfits]
         figures = [(misfit.nrmse**2, misfit.reduced_chi_square, misfit.gain) for misfit in misfits]
         square, chi_square, gain = np.average(figures, axis=0, weights=points)
-        inside = np.concatenate([_inside(result, test) for test in left_out]).mean()
+        inside = np.concatenate([_are_in_band(result, test) for test in left_out]).mean()
         rows.append((name, sum(points), 100.0 * np.sqrt(square), chi_square, 100.0 * gain, 100.0 * inside))
     return pd.DataFrame(rows, columns=["bushing", "points", "NRMSE [%]", "chi2 [-]", "mean gap [%]", "in band [%]"])
 
 
-def _inside(result: Result, test: MeasuredTest) -> Array:
-    """True for each operating point of a test whose |K| is within the 95 % band of prediction and noise, (n,)."""
+def _are_in_band(result: Result, test: MeasuredTest) -> Array:
+    """Mask of the operating points of a test whose |K| is in the 95 % band of prediction and noise, (n,)."""
     ratio = test.measured / test.noise_free(result.model).measured
     points = OperatingPoints(test.direction, test.frequency, test.amplitude, test.conditions)
     errors = uncertainty(result, result.model, points)

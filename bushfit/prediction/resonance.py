@@ -47,7 +47,7 @@ class PredictedResonance(PredictedPlace):
         warnings: warnings on a direction that was not fitted, on frequencies and strains near the peak outside the
             fitted range, and on unresolved effects.
         if_in_rig: response if the unresolved effects belong to the rig, not to the bushing; None without such effects.
-        conditions: preload and temperature of the rubber, as of `rubber_conditions`.
+        conditions: temperature [K] and preload of the rubber; None for a condition that the model does not depend on.
     """
 
     direction: Place
@@ -87,7 +87,7 @@ def predict_resonance(
         base_acceleration: zero-to-peak acceleration of the base [m/s^2].
         frequencies: frequencies [Hz]; None for a range about the resonance.
         temperature: temperature of the rubber [K]; None for the reference temperature.
-        preload: preload within the tested range; None as in `predict`.
+        preload: preload within the tested range; None for the tested preload nearest to zero.
 
     Returns:
         Transmissibility and amplitude at the frequencies.

@@ -45,7 +45,7 @@ class TimeResponse(PredictedPlace):
         unit_strain: equivalent strain per displacement [1/m, 1/rad or 1].
         tested: largest strain [1] and strain rate [1/s] of the fitted tests; None if the model was not fitted.
         warnings: warnings on extrapolation and on effects that are left out or constant.
-        conditions: temperature and preload of the rubber, as of `rubber_conditions`.
+        conditions: temperature [K] and preload of the rubber; None for a condition that the model does not depend on.
     """
 
     direction: Place

@@ -40,7 +40,8 @@ class StaticCurve(PredictedPlace):
         secant: static stiffness from end to end, (1,) [N/m, N m/rad or Pa].
         rate: rate of the motion [m/s, rad/s or 1/s].
         warnings: warnings on extrapolation, and on alternatives without a law in time.
-        conditions: temperature, and preload at which displacement and force are zero, as of `rubber_conditions`.
+        conditions: temperature [K] of the rubber, and preload at which displacement and force are zero; None for a
+            condition that the model does not depend on.
     """
 
     direction: Place

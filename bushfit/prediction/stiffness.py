@@ -60,7 +60,7 @@ class Prediction(PredictedPlace):
             None without unresolved effects.
         measured: measured complex stiffness at these points, mean of the repeats, in the unit of |K|, (n,); nan at a
             point without a measurement; None without sweeps.
-        conditions: preload and temperature of all points, as of `rubber_conditions`.
+        conditions: temperature [K] and preload of the rubber; None for a condition that the model does not depend on.
         over: slow large motion or static offset under the harmonic; None for the harmonic alone.
     """
 
@@ -114,7 +114,7 @@ def predict(
         sweeps: measured sweeps for comparison; None for no comparison.
         temperature: temperature of the rubber [K]; None for the reference temperature.
         preload: preload within the tested range; None for the tested preload nearest to zero.
-        over: slow large motion or static offset under the harmonic; None for the harmonic alone.
+        over: slow large motion, or static offset, on which the harmonic is superposed; None for the harmonic alone.
 
     Returns:
         Prediction at all combinations of frequency and amplitude.

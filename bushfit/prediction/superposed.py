@@ -116,7 +116,7 @@ def superposed_stiffness_and_slopes(
 
 
 def correction_factor(model: Model, points: OperatingPoints) -> Array:
-    """Complex factor by which the unnamed correction of a model changes its stiffness in sines at n points, (n,)."""
+    """Complex ratio of the stiffness of a model with and without its smooth unnamed correction, at n points, (n,)."""
     place, frequency, amplitude, conditions = points
     corrected, without = (
         source.stiffness(place, frequency, amplitude, conditions=conditions)
@@ -144,8 +144,8 @@ def timed_candidates(
         rig: True to include the effects of the rig, as in the tests.
 
     Returns:
-        Pairs of a model and the result that contains its errors; and a warning on alternatives that are left out, if
-        any.
+        Pairs of the result that contains the errors and the model; and a list with a warning on the alternatives that
+        are left out, empty if there are none.
 
     Raises:
         ModelError: an effect of the fitted model has no law in time.

@@ -53,7 +53,7 @@ class Validation:
 
     @property
     def entry(self) -> ValidationEntry:
-        """Figures of the comparison, as in diagnosis.json."""
+        """Name of the record and numbers of the comparison (NRMSE, gaps of peak and work), as in diagnosis.json."""
         return {
             "test": self.record.name,
             "direction": str(self.record.direction),
