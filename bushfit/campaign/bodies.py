@@ -98,6 +98,6 @@ class SpecimenSettings:
 
 
 def specimens_of(bushings: Iterable[SeveralBushings], coupons: Iterable[SpecimenSettings]) -> list[Specimen]:
-    """Make the specimens of a campaign: three directions of each of several bushings, then [[specimens]]."""
+    """Make the specimens of a campaign: the directions of each of several bushings, then the [[specimens]]."""
     directions = [place for table in bushings for place in Specimen.of_bushing(table.to_bushing())]
     return [*directions, *(Specimen(**vars(table)) for table in coupons)]

@@ -304,11 +304,11 @@ def reader_keywords(
 
 
 def with_unit_of_zero(tests: Sequence[AnyTest], units: Mapping[Place, str]) -> tuple[AnyTest, ...]:
-    """Tests of which those without preload ("none") have it in the unit of the other tests of their direction.
+    """Copy tests so that a preload of zero ("none") has the unit of the other preloads of its direction.
 
     Args:
         tests: loops or sweeps.
-        units: SI unit of the preloads by direction or specimen, m or N for example.
+        units: SI unit of the preloads by direction or specimen, such as "m" or "N".
     """
     return tuple(
         replace(test, preload=Preload(0.0, units.get(test.direction, test.preload.unit)))

@@ -43,14 +43,14 @@ def constraints_of(campaign: Campaign) -> Constraints:
         with error_location(campaign.path, place=f"fit.{name}"):
             _require_compatible_keys(setting)
             if earlier:
-                priors.append(_from_result(campaign, earlier, text, only=name))
+                priors.append(_prior_from_result(campaign, earlier, text, only=name))
             elif text:
                 priors.append(_prior(text, name))
     if whole := campaign.fit.prior:
         earlier = load_result(campaign.path.parent / whole)
         without = [name for name, setting in settings.items() if setting.prior or not setting.vary or setting.tie]
         with error_location(campaign.path, place="fit.prior"):
-            priors.append(_from_result(campaign, earlier, whole, without=without))
+            priors.append(_prior_from_result(campaign, earlier, whole, without=without))
     with error_location(campaign.path):
         return Constraints(priors, _ties(campaign))
 
@@ -86,7 +86,7 @@ def _prior(text: str, name: str) -> Prior:
     return Prior((name,), np.array([mean]), np.array([[deviation**2]]), text)
 
 
-def _from_result(
+def _prior_from_result(
     campaign: Campaign, result: Result, file: str, only: str | None = None, without: Sequence[str] = ()
 ) -> Prior:
     """Prior from the fitted values and the covariance of an earlier model.

@@ -105,7 +105,7 @@ def without_copied_points(sweeps: Sequence[Sweep]) -> list[Sweep]:
 
 
 def _used_once(first: AnyTest, copies: Sequence[AnyTest]) -> Caveat | None:
-    """Note on the copies of a test, with the names of their files; of one file, the names of the tests."""
+    """Note that names the files (or, within one file, the tests) with copies of a test; None without copies."""
     file = first.source.file if first.source else None
     names = [copy.source.file.name if copy.source and copy.source.file != file else copy.name for copy in copies]
     return Caveat("copied_tests", f"{_join_names(names)} with the same data: used once") if names else None

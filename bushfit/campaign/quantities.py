@@ -59,7 +59,7 @@ def parameter_value(place: str, name: str, raw: Any) -> float:
 
 
 def convert_effects(raw: dict[str, Any]) -> dict[str, Any]:
-    """Convert tables of parameter values by effect to SI, before pydantic checks them; other entries are unchanged."""
+    """Convert values such as {"inertia": {"mass": "0.1 kg"}} to SI, before pydantic checks them; keep other entries."""
     return {
         effect: {key: parameter_value(f"{effect}.{key}", f"{effect}.{key}", value) for key, value in table.items()}
         if isinstance(table, dict)
@@ -69,7 +69,7 @@ def convert_effects(raw: dict[str, Any]) -> dict[str, Any]:
 
 
 def convert_limits(raw: dict[str, Any], keys: Sequence[str]) -> dict[str, Any]:
-    """Convert tables of limits by parameter to SI, before pydantic checks them; other entries are unchanged.
+    """Convert limits of parameters to SI, before pydantic checks them; entries that are no tables are unchanged.
 
     Args:
         raw: tables by parameter name, such as {"mu": {"min": "1 MPa"}}.

@@ -43,7 +43,8 @@ def measured_session(bushing: Bushing | None, tests: Sequence[Loop | Sweep]) -> 
         tests: loops and sweeps, in order; the condition `order` of a test takes precedence.
 
     Returns:
-        Conditions of each test: one entry per row of a sweep, one entry for a loop.
+        Conditions of each test, in the order of `tests`. Temperature [K], session time (0 to 1) and earlier strains
+        have one entry per row of a sweep, one entry for a loop.
     """
     session_tests = []
     for test in tests:
@@ -61,11 +62,12 @@ def planned_session(bushing: Bushing | None, tests: Sequence[SimulatedTest], rep
 
     Args:
         bushing: the bushing; None if only specimens are tested.
-        tests: tables of [simulate].
-        repeats: repeats of each sweep and resonance test that states none.
+        tests: loops, sweeps and resonance tests to simulate, in order.
+        repeats: number of repeats of a sweep that states none, and of every resonance test; each repeat adds rows.
 
     Returns:
-        Conditions of each test: one entry per row of a sweep or resonance test, one per part of a loop.
+        Conditions of each test, in the order of `tests`. Temperature [K], session time (0 to 1) and earlier strains
+        have one entry per row of all repeats of a sweep or resonance test, one per loop of a record of loops.
     """
     session_tests = []
     for test in tests:

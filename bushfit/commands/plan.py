@@ -103,11 +103,12 @@ def plan_files(plan: Plan) -> list[ResultFile]:
 
 
 def _knowledge(source: Campaign | Result | Knowledge, rivals: Sequence[str] | None) -> Knowledge:
-    """Model and uncertainty before the planned tests, from a fitted model, a campaign's tests or its compound.
+    """Model and uncertainty of its parameters before the planned tests.
 
     Args:
-        source: fitted model, campaign, or knowledge, which is returned unchanged.
-        rivals: effects to distinguish; empty for those that a diagnosis cannot separate, None for no rivals.
+        source: fitted model; campaign with tests, [compound] or [simulate]; or knowledge, which is returned unchanged.
+        rivals: names of effects to distinguish; empty for those that a diagnosis of the tests cannot distinguish, None
+            to distinguish none.
     """
     if isinstance(source, Knowledge):
         return source

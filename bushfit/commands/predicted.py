@@ -117,7 +117,7 @@ class PredictionOutput:
 
     @cached_property
     def measured_by_fit(self) -> tuple[list[MeasuredSweep], list[MeasuredSweep]]:
-        """Measured sweeps to which the model was fitted, by directions and hashes of files, and the others."""
+        """Two lists: measured sweeps to which the model was fitted (same file and direction), and the other sweeps."""
         digests, measured = self.result.files.values(), self.result.measured
         of_files = [sweep for sweep in self.measured if sweep.source and sweep.source.sha256 in digests]
         fitted = [sweep for sweep in of_files if measured and str(sweep.direction) in measured.directions]

@@ -17,7 +17,7 @@ from bushfit.reading.measurement import Loop, Sweep
 
 
 def result_document(result: Result, campaign: Mapping[str, Any]) -> dict[str, Any]:
-    """Content of a model file: the result, its warnings, and its campaign as `campaign_document` describes it."""
+    """Content of a model file: the result, its warnings, and the description of its campaign (`campaign_document`)."""
     return {**to_document(result), **to_entries(warnings_of(result)), "campaign": campaign}
 
 

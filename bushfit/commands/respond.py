@@ -96,7 +96,7 @@ def respond(
         temperature: temperature of the rubber [K]; None for the reference temperature.
 
     Returns:
-        Force with band for each direction, its figures, and the result files.
+        Force with band for each direction, its peak, energy and strain, and the result files.
 
     Raises:
         MeasurementError, UnitError: a history that cannot be used.
@@ -153,7 +153,7 @@ def validation_files(validations: Sequence[Validation], title: str) -> list[Resu
     """Table validation.csv, and for each validation record a table and a figure of measured and predicted force.
 
     Args:
-        validations: comparisons with the model to use.
+        validations: validation records, compared with the force that the final model predicts.
         title: beginning of the titles of the figures.
 
     Returns:

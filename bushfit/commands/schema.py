@@ -78,7 +78,7 @@ def schema(name: str) -> dict[str, Any]:
 
 
 def _generator(way: str) -> Any:
-    """Schema generator of pydantic (slow to import) that adds descriptions from docstrings."""
+    """Class of pydantic's schema generator that adds descriptions from docstrings; `way` as in `Described`."""
     from pydantic.json_schema import GenerateJsonSchema
 
     class Generator(GenerateJsonSchema):

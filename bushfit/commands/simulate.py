@@ -43,7 +43,7 @@ def simulate_campaign(
 def simulated_tests(
     source: Model | Result | HasResult | Campaign,
 ) -> tuple[Model, SimulateSettings, Collection[str]]:
-    """Model to simulate, its tests (of the paper, unless a campaign states others), and effects that a fit has."""
+    """Model to simulate, its tests (default: those of the 2007 paper), and names of the effects to add in a fit."""
     if isinstance(source, Campaign):
         return model_of(source), source.simulate or SimulateSettings(), source.fit.effects
     model = source if isinstance(source, Model) else as_result(source).model
