@@ -13,7 +13,12 @@ _LISTENER = ContextVar[Listener]("_LISTENER", default=lambda *_: None)
 
 @contextmanager
 def report_progress_to(listener: Listener) -> Iterator[None]:
-    """Context in which `track` reports progress by calls of the listener."""
+    """Context in which `track` reports progress to a function.
+
+    Args:
+        listener: function that is called with the description of the work, the number of finished items (None at the
+            end), their total number (0 if unknown), and a remark.
+    """
     token = _LISTENER.set(listener)
     try:
         yield

@@ -37,6 +37,9 @@ def metadata_options(kind: Literal["tests", "histories", "displacements"] = "tes
     Args:
         kind: "tests" for loops and sweeps, with the metadata of a campaign; "histories" for raw histories and resonance
             tests; both add the argument `files`. "displacements" for one displacement history.
+
+    Returns:
+        Decorator that adds the options, such as --direction, --unit and --format, to the function of a command.
     """
     unit, header = ("axial=mm", "radial=Sy") if kind == "displacements" else ("force=kN", "force=Fz")
     words = f'Header of a column, such as "{header}". To list all roles, state an unknown one.'
@@ -76,11 +79,14 @@ def value_type(key: str) -> click.ParamType[Any] | None:
 
 
 def _test_options(kind: str, _: click.Context, values: dict[str, Any]) -> dict[str, Any]:
-    """Campaign keys that the metadata options state, with columns and units by the role of a column.
+    """Convert the values of the metadata options to keys of a campaign; options that are not given are left out.
 
     Args:
-        kind: kind of the files, as of `metadata_options`, which determines the roles.
+        kind: "tests", "histories" or "displacements", which determines the roles of columns.
         values: values of the options by key.
+
+    Returns:
+        Stated values by key, such as {"direction": "axial", "units": {"force": "kN"}}.
     """
     from bushfit.reading.headers import DISPLACEMENT_COLUMNS, LOOP_COLUMNS, RESONANCE_COLUMNS, SWEEP_COLUMNS
 

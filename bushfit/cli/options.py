@@ -137,7 +137,17 @@ def add_parameters(function: Function, *parameters: Parameter) -> Function:
 
 
 def option_group(heading: str, *parameters: Parameter, record: Record | None = None) -> Parameter:
-    """Group options under a heading of the help, in the given order; `record` makes one argument of them."""
+    """Group options under a heading of the help, in the given order.
+
+    Args:
+        heading: heading above the options.
+        *parameters: decorators of the options.
+        record: name of the argument that collects the values of the options, and function that makes it from the
+            context and these values by name; None to pass each value by itself.
+
+    Returns:
+        Decorator that adds the options to the function of a command.
+    """
 
     def decorate(function: Function) -> Function:
         before = len(getattr(function, "__click_params__", ()))

@@ -85,7 +85,7 @@ def command(files: tuple[Path, ...], levels: str | None, cycles: int, output: Ou
         figure = partial(plots.inspection.resonance_figure, resonance, title)
         _print_resonance(output, resonance, points)
     else:
-        histories = _read(files, test_options)
+        histories = _read_histories(files, test_options)
         body, direction = "direction", histories[0].direction
         name = str(direction)
         with error_location(place="--levels"):
@@ -185,7 +185,7 @@ def _reduce_resonance(
     return (resonance, "specimen", specimen) if specimen else (resonance, "direction", str(direction))
 
 
-def _read(files: Sequence[Path], test_options: Mapping[str, Any]) -> list[Loop]:
+def _read_histories(files: Sequence[Path], test_options: Mapping[str, Any]) -> list[Loop]:
     """Read stepped-sine histories of one direction; each is named by its file without extension, or by its path."""
     from bushfit.inspection.gathering import TestSource, distribute_options
     from bushfit.inspection.opening import read_history

@@ -95,6 +95,9 @@ def grid_options(default: str, *, static: bool = False) -> Parameter:
     Args:
         default: default in the help.
         static: True if "0 Hz", an empty grid, selects the static curve.
+
+    Returns:
+        Decorator that adds --frequencies, --amplitudes, --torsion-amplitudes and --strain-amplitudes to a command.
     """
     options = [
         option(f"--{name} GRID", words, type=grid(unit, static=static and unit == "Hz"))
@@ -113,11 +116,15 @@ def grid_options(default: str, *, static: bool = False) -> Parameter:
 
 
 def prediction_options(campaign: str, *, static: bool = False) -> Parameter:
-    """Create --direction, the options of the grid, --temperature, and --campaign.
+    """Create the options for the range and conditions of a prediction.
 
     Args:
         campaign: help text of --campaign.
         static: True if frequencies of "0 Hz" select the static curve.
+
+    Returns:
+        Decorator that adds --direction, --frequencies, the options of amplitudes, --temperature and --campaign to a
+        command.
     """
     return option_group(
         "Range and conditions",
