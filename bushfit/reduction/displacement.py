@@ -37,7 +37,8 @@ def noise_and_highest_frequency(value: NDArray[Any], step: float) -> tuple[float
         step: time between samples [s].
 
     Returns:
-        Standard deviation of the noise, in the unit of the displacement, and the frequency [Hz].
+        Standard deviation of the noise, in the unit of the displacement; and highest frequency [Hz] at which the
+        spectrum of the motion is above the noise.
 
     Notes:
         The fourth difference of a finely sampled motion is small compared with that of noise; its median magnitude
@@ -81,7 +82,7 @@ def prepare_displacements(
 
 
 def prepare_record(record: Loop, lowpass: float | None = None) -> Loop:
-    """Prepare a validation record for a model: resample it evenly, and treat the displacement as a history.
+    """Prepare a validation record for a model: even time steps, and a displacement without offset and (optional) noise.
 
     Args:
         record: record of time, displacement and force, in SI.

@@ -90,8 +90,8 @@ def split_record(loop: Loop, test: LoopFile = _TIMED) -> tuple[Loop, ...]:
             column.
 
     Returns:
-        Loops in order, each with its times in the record and its softening (see `measure_softening`). A record with one
-        amplitude and rate is returned whole.
+        Loops in order, each with its times in the record and its softening (relative excess of |K| in the first cycle
+        over the last). A record with one amplitude and rate is returned whole.
 
     Raises:
         MeasurementError: amplitude or rate change all the time, so that no two cycles are alike.
@@ -147,7 +147,7 @@ def steady_spans(loop: Loop, time: Floats, motion: Floats) -> list[SteadySpan]:
     if inner.size < 4 or 2.0 * sum(span.cycles for span in spans) > _LEAST_COVERED * np.count_nonzero(similar):
         return spans
     begins = middle_crossings(time, motion, turns, stroke_middles(motion[turns]))[1:-1]
-    if _scatter(begins, inner) > _MOST_SCATTER:
+    if _cycle_scatter(begins, inner) > _MOST_SCATTER:
         unit, factor = loop.direction.display.displacement
         low, high = factor * inner.min() / 2.0, factor * inner.max() / 2.0
         periods = time[turns[3:-1]] - time[turns[1:-3]]
@@ -163,7 +163,7 @@ def steady_spans(loop: Loop, time: Floats, motion: Floats) -> list[SteadySpan]:
     return []
 
 
-def _scatter(begins: Floats, sizes: Floats) -> float:
+def _cycle_scatter(begins: Floats, sizes: Floats) -> float:
     """Root mean square deviation of the cycles of a motion from equal cycles, relative to their amplitude.
 
     Upward and downward strokes may differ from each other.
@@ -225,7 +225,7 @@ def _spans_of_part(time: Floats, motion: Floats, turns: Integers, noise: float) 
         halves = np.diff(across[strokes])
         for run in _alike_runs(halves, _SAME_RATE * halves):
             first, last = strokes.start + run.start, strokes.start + run.stop
-            if _scatter(across[first : last + 1], size[first : last + 1]) > _MOST_SCATTER:
+            if _cycle_scatter(across[first : last + 1], size[first : last + 1]) > _MOST_SCATTER:
                 continue  # a swept sine, or two neighbouring rates
             begin, end = float(across[first]), float(across[last])
             period, stroke = 2.0 * (end - begin) / (last - first), float(np.median(size[first : last + 1]))

@@ -41,7 +41,7 @@ class Resonance:
         stiffness: complex stiffness of the mount [N/m], (k,).
         relative_error: standard error of the real and of the imaginary part of K, relative to |K|, (k,).
         rows: number of measured rows averaged in each point, (k,).
-        left_out: frequencies of the omitted points, whose error exceeds LARGEST_ERROR [Hz], (j,).
+        left_out: frequencies of the omitted points, whose relative error exceeds 20 % (LARGEST_ERROR) [Hz], (j,).
     """
 
     test: ResonanceTest

@@ -113,7 +113,7 @@ def steady_sines(history: Loop) -> tuple[list[SteadySine], int]:
 
 
 def distinct_points(sines: Sequence[SteadySine]) -> set[tuple[float, float]]:
-    """Distinct operating points of steady sines: natural logs of frequency and amplitude, rounded."""
+    """Distinct operating points of steady sines: ln of the frequency to 0.01, and ln of the amplitude to 0.1."""
     return {(round(np.log(sine.frequency), 2), round(np.log(sine.amplitude), 1)) for sine in sines}
 
 
@@ -236,7 +236,7 @@ def _step(history: Loop, cycles: Cycles, inside: slice, motion: Complex, force: 
     steady_motion = motion[steady]
     # by the phase of each cycle's fundamental, which scatters less than single crossings
     starts = edges[:-1] - np.angle(1j * steady_motion) / (2.0 * np.pi) * np.diff(edges)
-    if _creeps(np.log(np.diff(starts)), _SETTLING_FREQUENCY) or _creeps(np.log(np.abs(steady_motion)), 0.03):
+    if _has_trend(np.log(np.diff(starts)), _SETTLING_FREQUENCY) or _has_trend(np.log(np.abs(steady_motion)), 0.03):
         return None
     rows = slice(cycles.first_rows[used.start], cycles.first_rows[used.stop])
     fit = HarmonicFit.to_cycles(history.time[rows], history.displacement[rows], history.force[rows], edges)
@@ -261,7 +261,7 @@ def _step(history: Loop, cycles: Cycles, inside: slice, motion: Complex, force: 
     )
 
 
-def _creeps(values: Floats, smallest: float) -> bool:
+def _has_trend(values: Floats, smallest: float) -> bool:
     """True if the total linear trend of values is larger than `smallest` and than their scatter explains.
 
     Args:
