@@ -71,7 +71,7 @@ def odd_recording(
 
     Args:
         record: record of a loop, of several loops or of a raw history [SI].
-        labels: stated quantities by their origin, as in `wrong_labels`.
+        labels: amplitudes and frequencies stated in texts, by origin: "name" or "text above the table".
         frequencies: frequencies of its motion [Hz].
         amplitudes: zero-to-peak amplitudes of its motion [m, rad or strain], (n,).
         stiffness: magnitudes of the stiffness at these amplitudes [N/m, N m/rad or Pa], (n,).

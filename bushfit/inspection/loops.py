@@ -40,14 +40,14 @@ _LONGEST_CYCLE = 3000.0
 
 
 def describe_loop(loop: Loop, labels: Mapping[str, Labels]) -> Findings:
-    """Facts and oddities of a loop.
+    """Describe a loop: facts such as frequency, amplitude and noise, and anything unusual.
 
     Args:
         loop: loop [SI].
-        labels: stated quantities by their origin, as in `wrong_labels`.
+        labels: amplitudes and frequencies stated in texts, by origin: "name" or "text above the table".
 
     Returns:
-        Facts by name, and a sentence on each oddity.
+        Facts as texts by name, such as "sampling", and a warning on each oddity.
 
     Raises:
         FitError: no whole cycle, or a loop that runs the wrong way round.
@@ -108,14 +108,14 @@ def describe_loop(loop: Loop, labels: Mapping[str, Labels]) -> Findings:
 
 
 def describe_history(history: Loop, labels: Mapping[str, Labels]) -> Findings:
-    """Facts and oddities of a raw stepped-sine history.
+    """Describe a raw stepped-sine history: facts such as frequencies and amplitudes, and anything unusual.
 
     Args:
         history: record of the raw history [SI].
-        labels: stated quantities by their origin, as in `wrong_labels`.
+        labels: amplitudes and frequencies stated in texts, by origin: "name" or "text above the table".
 
     Returns:
-        Facts by name, and a sentence on each oddity.
+        Facts as texts by name, such as "sampling", and a warning on each oddity.
 
     Raises:
         MeasurementError: no steady sine in it.
@@ -138,15 +138,15 @@ def describe_history(history: Loop, labels: Mapping[str, Labels]) -> Findings:
 
 
 def describe_programme(record: Loop, loops: Sequence[Loop], labels: Mapping[str, Labels]) -> Findings:
-    """Facts and oddities of a record that contains several loops.
+    """Describe a record of several loops: facts such as frequencies and amplitudes, and anything unusual.
 
     Args:
         record: the whole record [SI].
         loops: loops of the record, in order.
-        labels: stated quantities by their origin, as in `wrong_labels`.
+        labels: amplitudes and frequencies stated in texts, by origin: "name" or "text above the table".
 
     Returns:
-        Facts by name, and a sentence on each oddity.
+        Facts as texts by name, such as "sampling", and a warning on each oddity.
 
     Raises:
         FitError: a part without a whole cycle, or one that runs the wrong way round.

@@ -180,7 +180,7 @@ def classify_recording(measured: Loop, labels: Mapping[str, Labels], test: LoopF
 
     Args:
         measured: recording in SI.
-        labels: stated quantities by their origin, as in `wrong_labels`.
+        labels: amplitudes and frequencies stated in texts, by origin: "name" or "text above the table".
         test: table of the recording in a campaign.
 
     Returns:

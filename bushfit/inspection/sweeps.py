@@ -48,14 +48,14 @@ _MOST_LISTED, _MOST_LEVELS = 4, 8
 
 
 def describe_sweep(sweep: Sweep, labels: Mapping[str, Labels]) -> Findings:
-    """Facts and oddities of a sweep.
+    """Describe a sweep: facts such as frequencies, amplitudes and noise, and anything unusual.
 
     Args:
         sweep: sweep [SI].
-        labels: stated quantities by their origin, as in `wrong_labels`.
+        labels: amplitudes and frequencies stated in texts, by origin: "name" or "text above the table".
 
     Returns:
-        Facts by name, and a sentence on each oddity.
+        Facts as texts by name, such as "frequencies", and a warning on each oddity.
     """
     unit, factor = sweep.direction.display.displacement
     frequencies, levels = np.unique(sweep.frequency), np.unique(sweep.amplitude)
