@@ -69,7 +69,7 @@ def find_lines_above(table: Table) -> list[Line]:
 
 
 def plain_numbers(line: Line, decimal: str | None) -> Line:
-    """Return a line whose texts have numbers without thousands separators; see `without_groups`."""
+    """Copy of a line without thousands separators in its numbers, where their value is clear ("1,500.0")."""
     if isinstance(line.content, str):
         return line._replace(content=without_groups(line.content, decimal))
     cells = [without_groups(cell, decimal) if isinstance(cell, str) else cell for cell in line.content]

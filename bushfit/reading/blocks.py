@@ -101,7 +101,7 @@ def find_segments(
         yield Segment(above, [])
 
 
-def combined(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> tuple[RowSource, Layout]:
+def combine_blocks(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> tuple[RowSource, Layout]:
     """Combine the blocks of a file into one table, and split cells with a complex number or a unit.
 
     Args:
@@ -277,7 +277,7 @@ def _stacked_blocks(source: RowSource, layout: Layout, vocabulary: Vocabulary) -
 
 
 def _with_plain_cells(source: RowSource, layout: Layout) -> tuple[RowSource, Layout]:
-    """Split the columns whose cells contain more than a number each, see `_plain_columns`."""
+    """Split columns whose cells contain a complex number, a magnitude and angle, a unit or an uncertainty."""
     source, layout = _with_units_in_cells(source, layout)
     width = len(layout.headers)
 

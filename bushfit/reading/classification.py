@@ -33,7 +33,7 @@ from bushfit.reading.inference import (
 )
 from bushfit.reading.si_columns import column_of, first_numbers, is_angular, refuse_second_unit
 from bushfit.reading.table import Table
-from bushfit.reading.times import clock
+from bushfit.reading.times import parse_clock
 
 #: Smallest similarity, from 0 to 1, of a header that is suggested for a missing one; chosen: one word of two suffices.
 _ALIKE = 0.4
@@ -57,8 +57,8 @@ def classify(
         stated_units: units as the user states them, by role.
 
     Returns:
-        Table with its columns by role, sentences on columns that were recognised only by their unit, and the indices of
-        columns that contain times as texts.
+        Copy of the table with the attributes `roles` (columns by role), `notes` (warnings on columns recognised only by
+        their unit) and `clocks` (indices of columns with times as texts).
 
     Raises:
         MeasurementError: it is not clear from the header which column has which role.
@@ -120,7 +120,7 @@ def classify(
     _require_plain_names(table, {role: column for role, column in roles.items() if role not in stated})
     notes += convert_roles(roles, certain=columns)
     time = roles.get("time")
-    is_clock = time is not None and clock(str(table.first_row[time.index])) is not None
+    is_clock = time is not None and parse_clock(str(table.first_row[time.index])) is not None
     notes = [*table.layout.notes, *notes]
     clocks = frozenset({time.index} if time and is_clock else ())
     return replace(table, roles=roles, notes=tuple(notes), clocks=clocks)

@@ -103,7 +103,7 @@ def view_bytes(
     return data
 
 
-def unpack(data: bytes, file: Path) -> bytes:
+def unpack_gzip(data: bytes, file: Path) -> bytes:
     """Return the content of a file that gzip packed; the bytes of any other file are unchanged.
 
     Raises:
@@ -206,7 +206,7 @@ def to_utf8(data: bytes, file: Path, stated_encoding: str | None = None) -> tupl
     """
     if stated_encoding is None and data.isascii() and 0 not in data:
         return _plain_bytes(data), "utf-8"
-    encoding = stated_encoding or detect(data)
+    encoding = stated_encoding or detect_encoding(data)
     if encoding in ("utf-8", "utf-8-sig"):
         without_mark = data.removeprefix(codecs.BOM_UTF8)
         if (bad := not_utf8(without_mark)) is None:
@@ -266,7 +266,7 @@ def _as_utf8(match: re.Match[str]) -> str:
         return match[0]
 
 
-def detect(data: bytes) -> str:
+def detect_encoding(data: bytes) -> str:
     """Detect the encoding of a text.
 
     Args:

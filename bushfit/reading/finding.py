@@ -6,13 +6,13 @@ from pathlib import Path
 
 from bushfit.errors import MeasurementError, error_location
 from bushfit.geometry import TRANSLATION, Motion
-from bushfit.reading.blocks import combined
+from bushfit.reading.blocks import combine_blocks
 from bushfit.reading.classification import classify
 from bushfit.reading.headers import ALL_COLUMNS, Vocabulary
 from bushfit.reading.labelled import Rows, select_rows
 from bushfit.reading.layout import DELIMITERS, FileFormat, Layout, find_layout
 from bushfit.reading.parts import OpenedFile, open_file
-from bushfit.reading.reshape import reshaped
+from bushfit.reading.reshape import reshape_table
 from bushfit.reading.roles import PAIRS, of_motion
 from bushfit.reading.source import RowSource, Sheet
 from bushfit.reading.table import Table
@@ -109,7 +109,7 @@ def _locate(
             for source in opened.parts:
                 mark = "" if isinstance(source, Sheet) else DELIMITERS.get(stated.delimiter or "")
                 layout = source.layout or find_layout(source.head, vocabulary, mark, stated.header_line)
-                if not stated.header_line and (long := reshaped(source, layout, vocabulary)):
+                if not stated.header_line and (long := reshape_table(source, layout, vocabulary)):
                     source, layout = long, find_layout(long.head, vocabulary, "")
-                located.append(((source, layout), combined(source, layout, vocabulary)))
+                located.append(((source, layout), combine_blocks(source, layout, vocabulary)))
     return opened.located[key]

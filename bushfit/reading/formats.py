@@ -19,11 +19,11 @@ from bushfit.reading.source import Channel, Group
 _MOST_VALUES = 1 << 28
 
 
-def matlab(data: bytes, _: Path) -> Iterator[Group]:
+def read_matlab(data: bytes, _: Path) -> Iterator[Group]:
     """Read the vectors and matrices of a MATLAB or HDF5 file as channels.
 
     Yields:
-        A group for the variables of the file, and one for each struct.
+        Title, channels and properties (name, value) of the variables of the file, then of each struct.
     """
     if data.startswith((b"MATLAB 7.3", b"\x89HDF")):
         import h5py
@@ -160,11 +160,11 @@ def _even_base(start: float, step: float, count: int, unit: str) -> Channel:
     return Channel(name, start + step * np.arange(count), unit)
 
 
-def tdms(data: bytes, _: Path) -> Iterator[Group]:
+def read_tdms(data: bytes, _: Path) -> Iterator[Group]:
     """Read the channels of a TDMS file; the x axis of a waveform is time, unless the file states another unit.
 
     Yields:
-        Each group of the file.
+        Title, channels and properties (name, value) of each group of the file.
     """
     from nptdms import TdmsFile
 
@@ -183,11 +183,11 @@ def tdms(data: bytes, _: Path) -> Iterator[Group]:
         yield group.name, channels, [*file.properties.items(), *group.properties.items()]
 
 
-def mdf(data: bytes, _: Path) -> Iterator[Group]:
+def read_mdf(data: bytes, _: Path) -> Iterator[Group]:
     """Read the channels of an MDF file; the base of each channel is the master channel of its group, such as time.
 
     Yields:
-        Each group of the file.
+        Title and channels of each group of the file, without properties.
     """
     from asammdf import MDF
 
@@ -203,11 +203,11 @@ def mdf(data: bytes, _: Path) -> Iterator[Group]:
             yield getattr(comments, "acq_name", "") or comments.comment or f"group {index + 1}", channels, ()
 
 
-def arrow(data: bytes, _: Path) -> Iterator[Group]:
+def read_arrow(data: bytes, _: Path) -> Iterator[Group]:
     """Read the columns of a Parquet or Arrow file, with units from the metadata of its fields.
 
     Yields:
-        One group with all columns.
+        One group without title and properties, with all columns as channels.
     """
     import pyarrow as pa
 

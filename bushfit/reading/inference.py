@@ -28,7 +28,7 @@ from bushfit.reading.numerals import is_like_number
 from bushfit.reading.roles import CONVERSIONS, of_motion, si_unit
 from bushfit.reading.si_columns import column_of, first_numbers
 from bushfit.reading.table import Table
-from bushfit.reading.times import clock
+from bushfit.reading.times import parse_clock
 
 #: Relative difference up to which two columns for one amplitude agree; chosen: some are rounded to few digits.
 AGREEMENT = 0.02
@@ -100,7 +100,7 @@ def add_by_unit(table: Table, roles: dict[str, Column]) -> tuple[list[Caveat], l
             header = f'"{fitting[0].header}"' if fitting[0].header else f"column {fitting[0].index + 1}"
             notes.append(Caveat("column_by_unit", f"{header} is read as the {role.replace('_', ' ')} by its unit"))
     if "time" in names and "time" not in roles:
-        stamps = [column for column in free if clock(str(table.first_row[column.index])) is not None]
+        stamps = [column for column in free if parse_clock(str(table.first_row[column.index])) is not None]
         roles |= {"time": replace(stamps[0], role="time")} if len(stamps) == 1 else {}
     return notes, list(free)
 

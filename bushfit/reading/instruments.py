@@ -19,13 +19,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from bushfit.errors import MeasurementError
-from bushfit.reading.formats import arrow, matlab, mdf, tdms
+from bushfit.reading.formats import read_arrow, read_matlab, read_mdf, read_tdms
 from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS, Vocabulary
 from bushfit.reading.layout import Layout
 from bushfit.reading.lines import Line
 from bushfit.reading.source import Channel, Channels, Group, Sheet
-from bushfit.reading.uff import uff
-from bushfit.reading.workbook import workbook
+from bushfit.reading.uff import read_uff
+from bushfit.reading.workbook import read_workbook
 
 #: Names of channels whose values cannot be complex.
 _REAL = Vocabulary(
@@ -57,13 +57,13 @@ class Format(NamedTuple):
 
 #: Supported formats of recordings.
 _FORMATS = (
-    Format("MATLAB", (".mat",), rb"MATLAB (?:5\.0|7\.3) MAT-file", matlab, _MATLAB_HINT),
-    Format("HDF5", (".h5", ".hdf5"), rb"\x89HDF", matlab),
-    Format("TDMS", (".tdms",), rb"TDSm", tdms),
-    Format("UFF", (".uff", ".unv"), rb" {4}-1 *\r?\n +\d+", uff, _UFF_HINT),
-    Format("MDF", (".mf4", ".mdf"), rb"MDF     |UnFinMF ", mdf),
-    Format("Parquet or Arrow", (".parquet", ".feather", ".arrow"), rb"PAR1|ARROW1", arrow),
-    Format("", (), rb"PK\x03\x04|\xd0\xcf\x11\xe0", workbook, again="save it again as xlsx, or as CSV"),
+    Format("MATLAB", (".mat",), rb"MATLAB (?:5\.0|7\.3) MAT-file", read_matlab, _MATLAB_HINT),
+    Format("HDF5", (".h5", ".hdf5"), rb"\x89HDF", read_matlab),
+    Format("TDMS", (".tdms",), rb"TDSm", read_tdms),
+    Format("UFF", (".uff", ".unv"), rb" {4}-1 *\r?\n +\d+", read_uff, _UFF_HINT),
+    Format("MDF", (".mf4", ".mdf"), rb"MDF     |UnFinMF ", read_mdf),
+    Format("Parquet or Arrow", (".parquet", ".feather", ".arrow"), rb"PAR1|ARROW1", read_arrow),
+    Format("", (), rb"PK\x03\x04|\xd0\xcf\x11\xe0", read_workbook, again="save it again as xlsx, or as CSV"),
 )
 #: File name endings of recordings.
 RECORDINGS = tuple(ending for one in _FORMATS for ending in one.endings)

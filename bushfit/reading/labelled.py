@@ -140,7 +140,7 @@ def select_rows(table: Table, labels: Mapping[str, tuple[int, Sequence[str]]], w
 
     Args:
         table: table with all rows.
-        labels: columns that assign rows to tests, see `find_labels`.
+        labels: index and texts, (n,), of the columns "direction", "specimen_number" and "run" that the file has.
         wanted: texts that the rows must have in these and other columns.
 
     Returns:
@@ -187,7 +187,7 @@ def note_not_understood(
 
     Args:
         table: table with all rows.
-        labels: columns that assign rows to tests, see `find_labels`.
+        labels: index and texts, (n,), of the columns "direction", "specimen_number" and "run" that the file has.
         rows: indices of the rows that were read, (n,); None for all.
         settled: frequency and nominal amplitude of these rows, (n,) each; none for a loop. Numbers that are constant at
             each operating point, and texts that are constant at each frequency or amplitude, need no warning.

@@ -125,7 +125,7 @@ class ConditionColumn:
 
         Args:
             rows: indices of the rows to select from, (n,).
-            points: as for `levels`.
+            points: quantities that determine an operating point of a sweep, such as the frequency, of all rows.
             stated: value in the unit of the condition; None if the user states none.
 
         Returns:

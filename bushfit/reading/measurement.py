@@ -55,7 +55,12 @@ class Source:
 
 @dataclass(frozen=True)
 class RecordPart:
-    """Position of a loop in a record of several loops: index of its first row, and a sentence on rows left out."""
+    """Position of a loop in a record of several loops.
+
+    Args:
+        first_row: index of the first row of the loop in the record.
+        left_out: sentence on the rows left out before and after the loop; None without such rows.
+    """
 
     first_row: int
     left_out: str | None = None
@@ -120,7 +125,7 @@ class Sweep:
     mass swings on a mount, neither is constant.
 
     Args:
-        name, direction, source, weight: as in `Loop`.
+        name, direction, source, weight: name, tested direction or specimen, provenance, and weight in a fit.
         frequency: frequency [Hz], (n,).
         amplitude: nominal displacement amplitude, zero-to-peak [m or rad, or strain], (n,).
         stiffness: complex stiffness [N/m or N m/rad], or modulus [Pa], (n,).
@@ -131,7 +136,7 @@ class Sweep:
         relative_error: standard deviation of the real and of the imaginary part of each point, relative to |K|, (n,);
             None if the file does not state it.
         temperature: temperature of the test, or of each point, (n,) [K]; None if it is not known.
-        preload: as in `Loop`.
+        preload: static displacement or force about which the test was made; None if it is not known.
 
     Raises:
         MeasurementError: arrays of different length.
@@ -189,7 +194,7 @@ def rebuild_time(
 
     Args:
         displacement: displacement [m or rad], (n,), any number of strokes, with a range above zero.
-        rate: speed [m/s or rad/s].
+        rate: speed [m/s or rad/s], of a sine the mean speed of each stroke; None if it is not known.
         frequency: frequency [Hz], used if no rate is given; default 1 Hz.
         waveform: shape of the displacement over time.
 

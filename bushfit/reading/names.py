@@ -126,10 +126,11 @@ class Labels:
     Args:
         quantities: quantities that may be the amplitude or frequency of the test.
         direction: direction of the bushing; None if it is not named.
-        temperature, preload, date, operator, specimen_number: values for these keys of a campaign, as texts.
+        temperature, preload, date, operator, specimen_number: values for these keys of a campaign, as texts such as
+            "23 degC" and "500 N".
         part_number: number of the part, which replaces `specimen_number` above a table if that is not stated.
-        sampling: sampling rate or interval of a record as its number and unit, separated by a blank.
-        convention: convention of the amplitudes in the table.
+        sampling: sampling rate or interval of a record, such as "500 Hz" or "2 ms".
+        convention: convention of the amplitudes in the table, "zero-to-peak" or "peak-to-peak".
         force: force in a name without a word for its meaning; the preload if the names of several tests differ in it.
     """
 

@@ -117,7 +117,10 @@ def is_like_number(text: str) -> bool:
 
 
 def plainest_value(text: str) -> float:
-    """Number in a cell, in the simplest notation in which the cell is a number; NaN if there is none."""
+    """Number in a cell, in the first notation that fits; NaN if none does.
+
+    Notations without a thousands separator are tried first, and a decimal point before a decimal comma.
+    """
     return next((value for way in ALL_NUMERALS if (value := way.value(text)) is not None), math.nan)
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from bushfit.errors import MeasurementError, did_you_mean
-from bushfit.reading.files import join_quoted, sha256, to_utf8, unpack, view_bytes
+from bushfit.reading.files import join_quoted, sha256, to_utf8, unpack_gzip, view_bytes
 from bushfit.reading.instruments import format_of, read_parts, word_for_part
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.source import RowSource, Text
@@ -28,7 +28,7 @@ class OpenedFile:
         checksum: SHA-256 of the file, which may still be running in a thread.
         stated: format of the file as the user states it.
         parts: text, sheets or groups of channels that can contain the table.
-        located: tables that were located already, by the columns and units that the user states; see `finding`.
+        located: tables that were located already, by the columns and units that the user states.
     """
 
     file: Path
@@ -59,7 +59,7 @@ def open_file(file: Path, file_format: FileFormat) -> OpenedFile:
         MeasurementError: the file cannot be read, or has no part with this name.
     """
     packed, name = view_bytes(file, MeasurementError), file_format.sheet
-    checksum, data = sha256(packed), unpack(packed, file)
+    checksum, data = sha256(packed), unpack_gzip(packed, file)
     recording = format_of(data, file)
     parts = read_parts(data, file, recording) if recording else ()
     if not parts and name:

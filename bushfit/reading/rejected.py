@@ -16,7 +16,7 @@ from bushfit.reading.lines import is_row, is_summary_row
 from bushfit.reading.measurement import Floats
 from bushfit.reading.numerals import is_like_number
 from bushfit.reading.source import LEAST_VALUE, Sheet
-from bushfit.reading.times import clock
+from bushfit.reading.times import parse_clock
 
 if TYPE_CHECKING:
     from bushfit.reading.table import Table
@@ -57,7 +57,7 @@ def row_fault(table: Table, cells: Sequence[str | float]) -> str | None:
         if cells[index] in table.marks.get(index, ()):
             return "missing"
         if isinstance(cells[index], str) and not is_like_number(texts[index]):
-            if index in table.clocks and clock(texts[index]) is not None:
+            if index in table.clocks and parse_clock(texts[index]) is not None:
                 continue
             if index in table.clocks or not any(map(is_like_number, texts)):
                 return "other"

@@ -34,7 +34,7 @@ _PAIR = re.compile(
 _FIRST_ROWS = 50
 
 
-def reshaped(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> Sheet | None:
+def reshape_table(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> Sheet | None:
     """Reshape a table without a column for each quantity.
 
     Args:

@@ -51,7 +51,7 @@ def read_resonance(table: Table, direction: Place, base_acceleration: float | No
     """Read a resonance test from a table.
 
     Args:
-        table: table that was opened with RESONANCE_COLUMNS.
+        table: table whose columns have the roles of a resonance test (RESONANCE_COLUMNS), such as "transmissibility".
         direction: direction of the bushing, or the specimen, that is the mount.
         base_acceleration: zero-to-peak acceleration of the base [m/s^2], for a table without a column for it.
 

@@ -65,7 +65,7 @@ def runs_of(
         The quantity that changes less often from row to row is constant in a run. If the rows are not in the order of
         recording, or runs would have few points, as in a sorted table, the quantity with more values is stepped.
     """
-    levels = nominal(amplitude)
+    levels = nominal_amplitudes(amplitude)
     if (levels == amplitude).all() and repeat is None:
         levels = _by_rank(amplitude, _group_numbers(frequency), fewest_points=2)
     if (levels == amplitude).all():
@@ -81,7 +81,7 @@ def runs_of(
         passes = np.cumsum(np.append(False, turns))
         if _group_spans(np.log(amplitude), passes).max() >= _WIDEST_PASS:
             return Runs(None, amplitude, passes + 1 if repeat is None else repeat)
-        levels = nominal(_group_medians(amplitude, passes))  # one level in each pass over the frequencies
+        levels = nominal_amplitudes(_group_medians(amplitude, passes))  # one level in each pass over the frequencies
         repeats_frequency, repeats_level = 0.0, 1.0
     frequency_count, level_count = (np.unique(values).size for values in (frequency, levels))
     if repeat is None:
@@ -98,7 +98,7 @@ def runs_of(
     return Runs(stepped, levels, repeat)
 
 
-def nominal(amplitude: Floats) -> Floats:
+def nominal_amplitudes(amplitude: Floats) -> Floats:
     """Replace each reached amplitude, (n,), by its nominal level: the median of a narrow group of amplitudes.
 
     Returns the amplitudes themselves if wide gaps do not separate them into narrow groups of several points.
@@ -130,7 +130,7 @@ def _by_rank(amplitude: Floats, group: NDArray[np.intp], *, fewest_points: int) 
     """
     rank, shapes, groups = np.empty(amplitude.size, dtype=np.intp), set(), group_rows(group)
     for rows in groups:
-        levels = nominal(amplitude[rows]) if fewest_points > 1 else amplitude[rows]
+        levels = nominal_amplitudes(amplitude[rows]) if fewest_points > 1 else amplitude[rows]
         levels, rank[rows], counts = np.unique(levels, return_inverse=True, return_counts=True)
         shapes.add((levels.size, counts.min(), counts.max()))
     (level_count, fewest, most), *others = shapes

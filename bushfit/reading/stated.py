@@ -102,10 +102,18 @@ def place_tested(test: Mapping[str, object], specimens: Sequence[Specimen]) -> P
 
 
 def with_places(tables: Any, specimens: Sequence[Specimen]) -> Any:
-    """Return the parsed table [simulate] with the texts direction and specimen of each test replaced by an object.
+    """Replace the texts that state what was tested by a direction or specimen, in all tests of a table [simulate].
+
+    Args:
+        tables: table [simulate] as parsed from TOML; a value that is no table is returned unchanged.
+        specimens: all specimens of the campaign.
+
+    Returns:
+        Copy of the table, in whose tests the key "direction" contains a `Place` instead of the texts under the keys
+        "direction", "specimen" and "bushing".
 
     Raises:
-        CampaignError: the keys of a test do not name a direction or specimen; see `place_tested`.
+        CampaignError: the keys of a test do not name a direction or specimen.
     """
 
     def with_place(test: Any, place: str) -> Any:

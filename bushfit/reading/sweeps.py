@@ -60,9 +60,10 @@ def read_sweep(
     """Read a stepped-sine sweep from a test file.
 
     Args:
-        file: path, or opened file, of a long or wide table (see `wide`) with columns frequency, amplitude and one of
-            PAIRS. Optional columns: repeat (by default, an operating point that occurs again is a repeat), amplitude
-            reached, temperature, and relative error.
+        file: path, or opened file, of a table with frequency, amplitude and two quantities that give the complex
+            stiffness, such as |K| and loss factor; frequencies or amplitudes may be across. Optional columns: repeat
+            (by default, an operating point that occurs again is a repeat), amplitude reached, temperature, and relative
+            error.
         direction: direction of the bushing, or the specimen.
         test: table [[sweeps]] of the campaign, with the information that the file does not contain. Its temperature
             selects rows of a file with several temperatures.

@@ -36,7 +36,7 @@ from bushfit.reading.rejected import (
 )
 from bushfit.reading.roles import of_motion
 from bushfit.reading.source import LARGEST_VALUE, Channels, RowSource, Text, cells_of
-from bushfit.reading.times import clock
+from bushfit.reading.times import parse_clock
 
 #: Number of first rows that are examined; chosen: a long record need not be read completely.
 _FIRST = 1000
@@ -361,7 +361,7 @@ class Table:
         Raises:
             MeasurementError: the cell has no finite number, or one above LARGEST_VALUE.
         """
-        cell, value_of = cells[column.index], clock if column.index in self.clocks else self.numerals.value
+        cell, value_of = cells[column.index], parse_clock if column.index in self.clocks else self.numerals.value
         value = value_of(cell) if isinstance(cell, str) else cell
         if value is None or not abs(value * column.scale) <= LARGEST_VALUE:
             raise bad_row(self, line, cells, column=column)

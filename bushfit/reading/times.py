@@ -40,7 +40,7 @@ _DAY_NUMBERS = (20_000.0, 80_000.0)
 _LARGEST_DAY_STEP = 1e-4
 
 
-def clock(text: str) -> float | None:
+def parse_clock(text: str) -> float | None:
     """Parse a clock time such as "20:07:10.1", with or without a date before it.
 
     In 07:10:100 the last part is milliseconds. Days and months that are ambiguous are read as day and month; only the

@@ -25,7 +25,7 @@ _CODES = re.compile(r"(\s*-?\d+){4}\s*")
 _ROTATIONS = 4
 
 
-def uff(data: bytes, file: Path) -> Iterator[Group]:
+def read_uff(data: bytes, file: Path) -> Iterator[Group]:
     """Read the functions of a universal file (dataset 58) or, if it has none, its data at nodes (dataset 55).
 
     Yields:

@@ -32,11 +32,11 @@ _PERCENTAGES = {"9": "0%", "10": "0.00%"}
 _FORMAT_END = re.compile(r'[0#?](?P<thousands>,*)(?:\s*(?P<percent>%)|\s*"\s*(?P<unit>[^"]+?)\s*")?\s*(?:;|$)')
 
 
-def workbook(data: bytes, _: Path) -> Iterator[Sheet]:
+def read_workbook(data: bytes, _: Path) -> Iterator[Sheet]:
     """Read the sheets of a workbook.
 
     Yields:
-        Each sheet.
+        Sheets in order, each with its cells, hidden rows and visibility.
 
     Raises:
         MeasurementError: too many cells.
