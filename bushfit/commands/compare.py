@@ -111,8 +111,8 @@ def compare(
         families: model families to fit to a single campaign, such as "sliders" or "kraus+inertia"; () for all.
         preload: preload with its unit, such as "500 N", within the tested range of each result; default none.
         command: command line for the document.
-        grid: directions (default those in which all results were fitted), frequencies and amplitudes (default those
-            measured for all results), as of `predict`.
+        grid: directions (default those in which all results were fitted), frequencies [Hz] and amplitudes [m] (default
+            those measured for all results), torsion_amplitudes [rad] and strain_amplitudes.
 
     Returns:
         Differences of parameters and of predicted stiffness from the reference, with tables, figure and page.

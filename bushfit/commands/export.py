@@ -67,7 +67,8 @@ def export(
         source: name and SHA-256 of its model file, which the files quote.
         names: names of formats: "fmu", "nastran", "abaqus", "adams", "prony", "csv", "xlsx".
         campaign: campaign whose grid is the default.
-        grid: directions, frequencies and amplitudes, as of `predict`; all directions share one list of frequencies.
+        grid: directions, frequencies [Hz], amplitudes [m], torsion_amplitudes [rad] and strain_amplitudes; all
+            directions share one list of frequencies.
         settings: settings of `ExportRequest`, such as `accuracy`, `units` and `temperature`.
 
     Returns:

@@ -56,7 +56,8 @@ def plan(
         rivals: effects to distinguish; default those that the diagnosis cannot distinguish.
         targets: wanted half-width of the 95 % interval relative to the value, by parameter, or by "stiffness" or
             "loss_factor" everywhere or in one direction, such as "stiffness.axial".
-        grid: directions, frequencies and amplitudes of the wanted predictions, as of `predict`.
+        grid: directions, frequencies [Hz], amplitudes [m], torsion_amplitudes [rad] and strain_amplitudes of the wanted
+            predictions.
 
     Returns:
         Tests in their order with their expected results.

@@ -13,7 +13,7 @@ from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Direction, Place,
 from bushfit.model.result import Result
 from bushfit.prediction.caveats import MARGIN
 from bushfit.reading.measurement import Sweep
-from bushfit.reading.runs import nominal
+from bushfit.reading.runs import nominal_amplitudes
 from bushfit.simulation.undisturbed import PAPER_AMPLITUDES as PAPER_AMPLITUDES
 from bushfit.simulation.undisturbed import PAPER_FREQUENCIES as PAPER_FREQUENCIES
 
@@ -202,7 +202,7 @@ def measured_levels(sweeps: Sequence[Sweep], axis: Literal["frequency", "amplitu
     if axis == "amplitude":  # amplitudes of one level, as each sweep has it, are the same
         controlled = [np.stack((sweep.amplitude, sweep.frequency)) for sweep in sweeps if sweep.stepped]
         points = np.unique(np.hstack([np.empty((2, 0)), *controlled]), axis=1)  # once, however often it was repeated
-        levels = dict(zip(points[0].tolist(), nominal(points[0]).tolist(), strict=True))
+        levels = dict(zip(points[0].tolist(), nominal_amplitudes(points[0]).tolist(), strict=True))
     for sweep in sweeps:
         values = getattr(sweep, axis)
         if sweep.stepped:

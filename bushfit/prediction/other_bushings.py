@@ -28,7 +28,7 @@ def predict_each_bushing(
     Args:
         data: prepared campaign.
         effects: names of the effects of the model.
-        directions: directions, specimens or bushings whose tests to use; see `PreparedCampaign.select_tests`.
+        directions: names of the directions, specimens or bushings whose tests are used; None for the default of a fit.
 
     Returns:
         A row per bushing; none for tests of fewer than two. Columns: name; number of operating points; root mean square

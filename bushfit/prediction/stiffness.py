@@ -34,7 +34,7 @@ from bushfit.prediction.caveats import (
 from bushfit.prediction.conditions import OperatingPoints, PredictedPlace, rubber_conditions
 from bushfit.prediction.superposed import LargeMotion, superposed_stiffness_and_slopes, timed_candidates
 from bushfit.reading.preload import Preload
-from bushfit.reading.runs import nominal
+from bushfit.reading.runs import nominal_amplitudes
 from bushfit.units import number
 
 #: Predicted quantities.
@@ -247,7 +247,7 @@ def measured_stiffness(points: OperatingPoints, sweeps: Sequence[MeasuredSweep])
         np.concatenate([np.empty(0), *(getattr(sweep, name) for sweep in mine)])
         for name in ("frequency", "amplitude", "measured")
     )
-    far = np.minimum(*(np.abs(reached / points.amplitude[:, None] - 1.0) for reached in (x, nominal(x))))
+    far = np.minimum(*(np.abs(reached / points.amplitude[:, None] - 1.0) for reached in (x, nominal_amplitudes(x))))
     near = (np.abs(f / points.frequency[:, None] - 1.0) <= MARGIN) & (far <= MARGIN)
     count = near.sum(axis=1)
     return np.where(count > 0, near @ stiffness / np.maximum(count, 1), np.nan)

@@ -93,7 +93,7 @@ def validate(result: Result, records: Sequence[Loop]) -> list[Validation]:
 
     Args:
         result: fitted result.
-        records: records of time, displacement and force under any motion, from `prepare_record`.
+        records: records of displacement and force under any motion at evenly spaced times, from `prepare_record`.
 
     Returns:
         Comparison for each record.

@@ -169,7 +169,7 @@ def draw_map(axes: Axes, group: SweepGroup, rows: Sequence[Curve], header: str, 
     Args:
         axes: panel.
         group: group of sweeps, which gives the quantity across.
-        rows: rows of the map from `map_rows`, the smallest amplitude or frequency first.
+        rows: points of each row of the map, the smallest amplitude or frequency first.
         header: header of the column to draw, measured minus model [%].
         colors: colour scale from `color_scale`.
     """

@@ -79,7 +79,7 @@ def sweep_groups(table: pd.DataFrame, result: Result) -> list[SweepGroup]:
     """Group the sweeps of a table by direction or specimen and by stepped quantity, for the panels of a figure.
 
     Args:
-        table: table from `tables.sweeps_table`, or the sweeps of the table from `diagnosed.gap_table`.
+        table: measured and modelled sweeps, a row per point, with the columns of sweeps.csv or gap.csv.
         result: model, which gives the specimens by their names.
 
     Returns:
@@ -155,7 +155,7 @@ def loops_by_direction(table: pd.DataFrame, result: Result) -> Iterator[tuple[Pl
     """Split a table into the loops of each direction or specimen, for the panels of a figure.
 
     Args:
-        table: table from `tables.loops_table`, or the loops of the table from `diagnosed.gap_table`.
+        table: measured and modelled loops, a row per sample, with the columns of loops.csv or gap.csv.
         result: model, which gives the specimens by their names.
 
     Yields:

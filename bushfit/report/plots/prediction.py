@@ -14,7 +14,7 @@ from bushfit.model.result import Result
 from bushfit.prediction.caveats import rig_effects
 from bushfit.prediction.static_curve import StaticCurve
 from bushfit.prediction.stiffness import Prediction, predict
-from bushfit.reading.runs import nominal
+from bushfit.reading.runs import nominal_amplitudes
 from bushfit.report.plots import style
 from bushfit.report.plots.fits import draw_curves, points_note, points_to_draw
 from bushfit.report.plots.measured import Axis, header_of, rows_at_conditions, sweep_groups, table_stiffness
@@ -46,8 +46,8 @@ def prediction_figure(
     Args:
         result: fitted or given model.
         prediction: prediction for one direction or specimen.
-        table: measured sweeps from `tables.sweeps_table`; those at the conditions of the prediction are drawn as
-            points. None for no points.
+        table: measured sweeps, a row per point, with the columns of sweeps.csv; those at the conditions of the
+            prediction are drawn as points. None for no points.
         title: title of the figure.
         note: further sentences below the figure.
 
@@ -206,7 +206,7 @@ def points_near(table: pd.DataFrame | None, header: str, levels: Array) -> list[
     if table is None:
         return [pd.DataFrame({"outlier": []})] * levels.size
     values = table[header].to_numpy()
-    by_value, by_nominal = (np.abs(column[:, None] / levels - 1.0) for column in (values, nominal(values)))
+    by_value, by_nominal = (np.abs(column[:, None] / levels - 1.0) for column in (values, nominal_amplitudes(values)))
     distance = np.where(by_value.min(axis=1, keepdims=True) <= _SAME, by_value, by_nominal)
     nearest = (distance <= _SAME) & (distance == distance.min(axis=1, keepdims=True))
     return [table[mask] for mask in nearest.T]

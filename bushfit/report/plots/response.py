@@ -20,7 +20,8 @@ def response_figure(title: str, table: pd.DataFrame, note: str = "") -> style.Ch
 
     Args:
         title: title of the figure.
-        table: table from `report.response.response_table`, or `record_table` with a measured force.
+        table: time; for each direction displacement and force with "low" and "high" ends of its band; and, of a
+            validation record, the measured force. Headers contain units (response.csv).
         note: further sentences below the figure.
 
     Returns:
