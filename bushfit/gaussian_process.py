@@ -49,7 +49,7 @@ def coordinates(frequency: Array, strain: Array, temperature: Array | None = Non
 
 
 def in_lengths(points: Array, lengths: Sequence[float]) -> Array:
-    """Points divided by the correlation lengths of a Gaussian process.
+    """Divide coordinates of operating points by the correlation lengths of a Gaussian process.
 
     Args:
         points: coordinates from `coordinates`, (..., 2 or 3).
@@ -171,10 +171,10 @@ class RestrictedLikelihood:
 
     @classmethod
     def from_columns(cls, columns: Array, residual: Array, span: Array) -> "RestrictedLikelihood":
-        """Build the likelihood from the whitened residuals of the patterns and of the fit.
+        """Build the likelihood from residual changes by the patterns of the process and the residuals of the fit.
 
         Args:
-            columns: whitened residuals for a unit of each pattern, (q, n).
+            columns: change of the whitened residuals per unit of each pattern, (q, n).
             residual: whitened residuals of the fit, already projected out of the span, (n,).
             span: orthonormal basis of the residual changes that the fitted parameters can absorb, (k, n).
         """
@@ -199,6 +199,6 @@ class RestrictedLikelihood:
         return float(logsumexp(self.gains(sizes)) - np.log(sizes.size))
 
     def freedom(self, size: float) -> float:
-        """Effective number of patterns that the data determine at a given size, at least 1."""
+        """Effective number of patterns that the data determine at a given size: freedom of that size, at least 1."""
         share = np.square(size) * self.values / (1.0 + np.square(size) * self.values)
         return max(float(np.sum(np.square(share))), 1.0)

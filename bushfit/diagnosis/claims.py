@@ -17,7 +17,7 @@ from scipy.ndimage import zoom
 from bushfit.caveat import Caveat
 from bushfit.effects import BASE
 from bushfit.effects.contract import Array
-from bushfit.effects.mistakes import MISTAKES, Mistake, file_or_name, get_mistake, labelled
+from bushfit.effects.mistakes import MISTAKES, Mistake, file_or_name, get_mistake, option_label
 from bushfit.errors import ModelError
 from bushfit.fitting.preparation import MeasuredSweep, MeasuredTest, prepare_loops, with_gain_errors
 from bushfit.fitting.prepared_campaign import PreparedCampaign
@@ -71,7 +71,7 @@ class Claim:
     @property
     def labels(self) -> tuple[str, ...]:
         """Values of the option --adopt that correct the mistake, "mistake:test" for each affected test."""
-        labels = tuple(labelled(self.mistake.name, test.name) for test in self.affected)
+        labels = tuple(option_label(self.mistake.name, test.name) for test in self.affected)
         return labels or (self.mistake.name,)
 
     @property
@@ -168,7 +168,7 @@ def claims(data: PreparedCampaign, without: Collection[str]) -> list[Claim]:
         indices = [
             index
             for index, data_set in enumerate(data_sets)
-            if labelled(mistake.name, data_set.name) not in without
+            if option_label(mistake.name, data_set.name) not in without
             and mistake.possible(data_set.test)
             and mistake.explains(data_set.test, float(moduli[index]), float(strains[index]))
         ]

@@ -19,7 +19,7 @@ from bushfit.diagnosis.document import (
 )
 from bushfit.diagnosis.holdout import HoldOut
 from bushfit.effects import effect_name_of, get_parameter
-from bushfit.effects.mistakes import get_candidate, labelled
+from bushfit.effects.mistakes import get_candidate, option_label
 from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.fitting.problem import FitResult
 from bushfit.geometry import Place
@@ -103,7 +103,7 @@ class NamedCause:
     @property
     def label(self) -> str:
         """Name of the effect or mistake in the form that the option --adopt accepts."""
-        return labelled(self.name, self.test)
+        return option_label(self.name, self.test)
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,12 @@ _ECHO = 1e-8
 
 
 def _relaxation_time_power(p: Values) -> Array:
-    """Relaxation time tau of springpot and spring, to the power alpha: tau^alpha = c/(2 pi 25 Hz)^alpha [s^alpha]."""
+    """Power tau^alpha = c/(2 pi 25 Hz)^alpha [s^alpha] of the relaxation time tau of a springpot and spring in series.
+
+    Args:
+        p: parameter values by name: order alpha [1] of the springpot; and c [1], modulus of the springpot over that of
+            the spring at 25 Hz, the reference frequency of all effects of rate.
+    """
     return np.asarray(p["c"]) / np.power(2.0 * np.pi * REFERENCE_FREQUENCY, p["alpha"])
 
 

@@ -54,7 +54,8 @@ class History:
         """Create the history of a steady state.
 
         Args:
-            value: samples of whole cycles [m, rad or 1], (..., n).
+            value: samples of whole cycles at equal time steps, without the first sample of the next cycle [m, rad or
+                1], (..., n).
             frequency: frequency of the excitation [Hz].
             cycles: number of cycles in the samples.
         """

@@ -108,14 +108,14 @@ class Mistake(Effect):
         )
 
     def possible(self, test: Loop | Sweep) -> bool:
-        """Return True if a test of this kind, motion, direction and stiffness can have the mistake."""
+        """True if a test of this kind, motion, direction and stiffness can have the mistake."""
         kind, place = "loop" if isinstance(test, Loop) else "sweep", test.direction
         fits = kind in self.kinds and self.motion in (None, place.motion)
         doubtful = self.doubt is None or (isinstance(test, Sweep) and self.doubt(test.stiffness))
         return fits and doubtful and not (self.swaps and place not in _EXCHANGED)
 
     def explains(self, test: Loop | Sweep, modulus: float, strain: float) -> bool:
-        """Test if a recording that is implausible for rubber becomes plausible when this factor of 1000 is corrected.
+        """True if the correction of a factor of 1000 makes a recording plausible that is implausible for rubber.
 
         Args:
             test: the test as stated.
@@ -156,7 +156,7 @@ class Mistake(Effect):
             f"[[{kind}]] of {file_or_name(test)}: {line.replace('{direction}', str(self._direction(test.direction)))}"
         )
 
-    def in_words(self, test: Loop | Sweep) -> str:
+    def sentence_for(self, test: Loop | Sweep) -> str:
         """Sentence that states the mistake in a test, with the line of the campaign file that corrects the mistake."""
         return f"{self.sentence.format(files=file_or_name(test))} (then, in the campaign: {self.correction_line(test)})"
 
@@ -228,7 +228,7 @@ _TABLE = tomllib.loads(Path(__file__).with_name("mistakes.toml").read_text(encod
 MISTAKES: dict[str, Mistake] = {name: _build_mistake(name, entry) for name, entry in _TABLE.items()}
 
 
-def labelled(name: str, test: str | None) -> str:
+def option_label(name: str, test: str | None) -> str:
     """Name of a mistake as in the option --adopt: `mistake:test`, or `mistake` if `test` is None."""
     return name if test is None else f"{name}{SEPARATOR}{test}"
 

@@ -82,7 +82,7 @@ class Patch:
 
 @dataclass(frozen=True)
 class Unnamed:
-    """Smooth correction over frequency and strain, relative to the stiffness.
+    """Smooth relative correction of the stiffness over frequency and strain, for a gap that no known effect explains.
 
     Args:
         size: standard deviation of the Gaussian process, relative to |K|.
@@ -125,7 +125,7 @@ class Unnamed:
         return self.largest / _DEVIATIONS
 
     def with_untested(self, place: Place) -> "Unnamed":
-        """Apply the correction to an untested direction of the bushing too, because its rubber is the same.
+        """Return the correction extended to `place`, an untested direction of the bushing, whose rubber is the same.
 
         Unchanged for another bushing or specimen, and if the tested directions have different corrections.
         """
@@ -172,7 +172,7 @@ def _correction(setting: Setting, omega: Array, amplitude: Array) -> Array:
 
 
 def response(values: Values, below: StiffnessBelow, omega: Array, amplitude: Array, setting: Setting) -> Array:
-    """Complex stiffness with the correction.
+    """Complex stiffness K (1 + c) with a relative correction c, interpolated between tabulated frequencies and strains.
 
     Args:
         values: not used; the data of the correction are in the setting.
@@ -187,7 +187,9 @@ def response(values: Values, below: StiffnessBelow, omega: Array, amplitude: Arr
 
 
 def first_harmonic(values: Values, below: ForceBelow, displacement: History, setting: Setting) -> Array:
-    """Force with the correction of its first harmonic.
+    """Force whose first harmonic is multiplied by 1 + c, with c interpolated from the table of a smooth correction.
+
+    The mean and the overtones are unchanged, because c is known at the frequency of the cycle only.
 
     Args:
         values: not used; the data of the correction are in the setting.

@@ -94,7 +94,7 @@ def describe_loop(loop: Loop, labels: Mapping[str, Labels]) -> Findings:
         )
         odd.append(Caveat("single_cycle", sentence))
     if frequency * _LONGEST_CYCLE < 1.0:  # longer than any laboratory waits: what may the file say instead?
-        mistakes = [mistake.in_words(prepared.test) for mistake in MISTAKES.values() if mistake.time < 1.0]
+        mistakes = [mistake.sentence_for(prepared.test) for mistake in MISTAKES.values() if mistake.time < 1.0]
         minutes = number(1.0 / frequency / 60.0, 2)
         sentence = f"one cycle takes {minutes} min, which is unusual; possible causes: {', or '.join(mistakes)}"
         odd.append(Caveat("slow_cycle", sentence))

@@ -289,7 +289,7 @@ def odd_losses(sweep: Sweep) -> Iterator[Caveat]:
         )
     mistakes = [mistake for mistake in MISTAKES.values() if mistake.doubt and mistake.possible(sweep)]
     if mistakes:
-        causes = ", or ".join(mistake.in_words(sweep) for mistake in mistakes)
+        causes = ", or ".join(mistake.sentence_for(sweep) for mistake in mistakes)
         loss = number(float(np.median(loss_factor(sweep.stiffness))), 2)
         sentence = f"the loss factor is {loss} in the median, unusual for rubber; possible causes: {causes}"
         yield Caveat("unusual_loss", sentence)

@@ -202,7 +202,7 @@ def part_modulus(model: Model, size: str, omega: Array, conditions: RubberCondit
 
 
 def values_under(model: Model, conditions: RubberConditions) -> Values:
-    """Parameter values [SI] of a model at the temperature of a test; unchanged if the temperature is unknown."""
+    """Parameter values [SI] by name of a model at the temperature of a test; unchanged if that is unknown."""
     if conditions.temperature is None:
         return model.values
     return model.without(*model.constant_modifiers).values_at(Specimen("compound", "modulus"), 1.0, 0.0, conditions)
@@ -233,7 +233,7 @@ def _starts(omega: Array, target: Array, arms: int) -> Iterator[tuple[Array, Arr
 def _fit(
     omega: Array, target: Array, total: Array, overhang_factor: float, moduli: Array, time: Array, rounds: int = 1
 ) -> tuple[float, Array, Array]:
-    """Fit Maxwell arms to complex moduli from start values, for the smallest maximum error.
+    """Fit moduli and times of Maxwell arms to complex moduli, for the smallest maximum relative error.
 
     Args:
         omega: angular frequencies [rad/s], (n,).

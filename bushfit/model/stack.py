@@ -43,7 +43,9 @@ def acting_layers(model: Model, setting: Setting, values: Values) -> list[tuple[
 
 @dataclass(frozen=True, eq=False)
 class Stack:
-    """The rubber and the layers around it in one test: the argument `below` of the next layer's functions.
+    """Rubber and some of the layers around it (effects of sleeve and rig) in one test, to compute stiffness and force.
+
+    It is the argument `below` of the functions of the next layer outward.
 
     Args:
         model: the model.

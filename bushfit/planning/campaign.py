@@ -31,7 +31,7 @@ def simulation_settings(tests: Sequence[Test], noise: Noise) -> SimulateSettings
     """
     counts = Counter(tests)
     return SimulateSettings(
-        noise=float(np.sqrt(np.mean(np.square(noise.scatter)))),
+        noise=float(np.sqrt(np.mean(np.square(noise.random)))),
         force_noise=noise.force,
         force_correlation=(noise.rows_as_one - 1.0) / (noise.rows_as_one + 1.0),
         gain_error=noise.shared[0],

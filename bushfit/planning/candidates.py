@@ -36,15 +36,15 @@ _PAPER_STRAIN = float(1.0 / np.sqrt(2.0 * (0.018**2 - 0.010**2) * np.log(1.8)))
 
 
 def standard_tests(knowledge: Knowledge, request: PlanRequest) -> list[Test]:
-    """List the runs of the standard programme, with which a plan is compared: the paper's tests of its bushing.
+    """List the runs of the standard programme, with which a plan is compared: the tests of Garcia Tarrago et al. 2007.
 
     Args:
         knowledge: model of the bushing or specimens.
         request: limits of the rig, and the specimens if there is no bushing.
 
     Returns:
-        Each run once, at the strains of the paper: axial loops and sweeps and radial sweeps of a bushing, or loops and
-        sweeps of each specimen.
+        Each run once, at the strains of that paper: axial loops and sweeps and radial sweeps of a bushing, or loops and
+        sweeps of each specimen. Loops and points beyond the limits of the rig are left out.
     """
     if knowledge.model.bushing is None:
         return [test for place in request.places for test in paper_tests(knowledge, request.rig, place)]
@@ -53,7 +53,7 @@ def standard_tests(knowledge: Knowledge, request: PlanRequest) -> list[Test]:
 
 
 def paper_tests(knowledge: Knowledge, rig: RigSettings, place: Place) -> list[Test]:
-    """List the paper's axial loops and sweeps, converted to another direction, with one run for each amplitude.
+    """List the axial loops and sweeps of Garcia Tarrago et al. 2007, converted to a direction, one run per amplitude.
 
     Args:
         knowledge: model of the bushing or specimens.
@@ -61,7 +61,8 @@ def paper_tests(knowledge: Knowledge, rig: RigSettings, place: Place) -> list[Te
         place: direction or specimen.
 
     Returns:
-        Loops, then sweeps, within the limits of the rig. The amplitudes cause the same strains as in the paper.
+        Loops, then sweeps, at amplitudes that cause the strains of the paper. Loops and points beyond the limits of the
+        rig are left out.
     """
     tube = bushing_at(knowledge.model.bushing, place)
     scale = _PAPER_STRAIN / knowledge.model.unit_strain(place)
@@ -126,7 +127,7 @@ def candidates(knowledge: Knowledge, request: PlanRequest) -> list[Test]:
 
 
 def _tests_within_limits(knowledge: Knowledge, rig: RigSettings, tests: Sequence[Test]) -> list[Test]:
-    """Select the loops and the steps of sweeps within the limits of rig and rubber.
+    """Select the loops and the points of sweeps within the rig's limits and a strain of 50 % or tested before.
 
     Args:
         knowledge: model that predicts forces and strains.

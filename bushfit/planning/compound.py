@@ -63,14 +63,15 @@ def guess_parameters(bushing: Bushing, compound: Compound) -> Knowledge:
         Estimates of mu, m, alpha, sigma_fmax and eps_half, with their covariance, from which a plan can start.
 
     Notes:
-        The laws of the estimate:
+        With S in Shore A, n phr of carbon black, and the values of the paper's bushing at index 0:
 
-            E   = 0.0981 (56 + 7.66 S) / (0.137505 (254 - 2.54 S)) MPa, S in Shore A               (Gent 1958) G   = E/3
-            = mu + Re m/2 (i omega_S)^alpha        omega_S = 1/(3 s): reading time of a durometer phi = (n/1.8) / (n/1.8
-            + 100/density)            volume fraction of n phr of carbon black X   = 1 + 2.5 phi + 14.1 phi^2
-            strain of the rubber between particles   (Guth 1945) q   = m/2 omega_0^alpha / mu = 0.25, alpha = 0.24
-            omega_0 = 2 pi 10 Hz r   = sigma_fmax/(2 eps_half mu) = 0.515 (phi/phi_0)^3.5 X_0/X
-            (Payne effect) eps_half = 0.013 X_0/X
+            E = 0.0981 (56 + 7.66 S)/(0.137505 (254 - 2.54 S)) MPa, G = E/3                   (Gent 1958)
+            G = mu + Re m/2 (i omega_S)^alpha, omega_S = 1/(3 s), the reading time of a durometer
+            phi = (n/1.8)/(n/1.8 + 100/density), volume fraction of carbon black
+            X = 1 + 2.5 phi + 14.1 phi^2, strain of the rubber between particles over the mean (Guth 1945)
+            q = m/2 omega_0^alpha/mu = 0.25, alpha = 0.24, omega_0 = 2 pi 10 Hz
+            r = sigma_fmax/(2 eps_half mu) = 0.515 (phi/phi_0)^3.5 X_0/X                      (Payne effect)
+            eps_half = 0.013 X_0/X
 
         The numbers are those of the paper's bushing (natural rubber, phi_0 of 27 phr, Table 1). Three laws apply them
         to another compound: a filler network stiffens with phi^3.5, filler amplifies strain by X, and filler amplifies

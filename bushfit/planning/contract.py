@@ -43,7 +43,7 @@ class Noise:
     Gain and phase errors [1 and rad] are the real and imaginary part of the error of ln K.
 
     Args:
-        scatter: independent error of each point of a sweep, (gain, phase).
+        random: independent error of each point of a sweep, (gain, phase).
         shared: error that all points of one run have in common, (gain, phase).
         level: error that all repeats of a test have in common, (gain, phase): the accuracy class of the rig, as stated
             in [rig]. For a loop, only the gain is used.
@@ -53,7 +53,7 @@ class Noise:
             choice: an amplifier that passes sixteen harmonics of the cycle.
     """
 
-    scatter: tuple[float, float] = (ASSUMED[0], ASSUMED[0])
+    random: tuple[float, float] = (ASSUMED[0], ASSUMED[0])
     shared: tuple[float, float] = ASSUMED
     level: tuple[float, float] = ASSUMED
     force: float = 5e-3

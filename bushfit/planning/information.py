@@ -205,7 +205,7 @@ class CandidateGrid:
         slopes = relative_slopes(knowledge, self.data_sets)
         columns, k = np.concatenate((slopes, departures)), len(slopes)
         noise, loops = self.knowledge.noise, split_by_kind(self.data_sets)[0]
-        scatter, shared = np.array(noise.scatter)[:, None], np.array(noise.shared)[:, None]
+        random, shared = np.array(noise.random)[:, None], np.array(noise.shared)[:, None]
         class_errors = np.maximum(noise.level, np.finfo(float).tiny)[:, None]  # of gain and phase
         products, squares, class_ratios = [], [], []
         for test, rows in zip(self.tests, self.rows, strict=True):
@@ -218,9 +218,9 @@ class CandidateGrid:
                 count = rows.shape[1]
                 unit_errors = np.eye(2)[:, :, None] * np.ones(count)  # of gain and of phase
                 parts = np.concatenate((unit_errors, columns[:, rows]))
-                share = 1.0 - 1.0 / np.sqrt(1.0 + count * (shared / scatter) ** 2)
+                share = 1.0 - 1.0 / np.sqrt(1.0 + count * (shared / random) ** 2)
                 unit = class_errors
-                whitened = ((parts - share * parts.mean(axis=-1, keepdims=True)) / scatter).reshape(len(parts), -1)
+                whitened = ((parts - share * parts.mean(axis=-1, keepdims=True)) / random).reshape(len(parts), -1)
             products.append(whitened[: 2 + k] @ whitened.T)
             squares.append(np.square(whitened[2 + k :]).sum(axis=1))
             class_ratios.append((np.abs(departures[:, rows]) / unit).reshape(len(departures), -1).max(axis=1))

@@ -210,7 +210,7 @@ def estimate_noise(data: PreparedCampaign) -> Noise:
     if sweeps:
         noise = sweeps[0].noise
         gain, phase = np.sqrt(np.mean(np.square(list(noise.random.values())), axis=0)).tolist()
-        estimate = replace(estimate, scatter=(gain, phase), shared=noise.shared)
+        estimate = replace(estimate, random=(gain, phase), shared=noise.shared)
     if loops:
         squares = [loop.relative_noise**2 * ROWS_PER_CYCLE * loop.cycles / loop.test.time.size for loop in loops]
         as_one = float(np.mean([loop.row_noise.rows_as_one for loop in loops]))

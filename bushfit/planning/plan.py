@@ -31,7 +31,7 @@ class Plan:
     Args:
         knowledge: model, covariance and noise before the planned tests.
         tests: runs of the rig, in the order in which they are made.
-        purposes: sentence on the accuracy lost without a test and all its repeats, by test.
+        purposes: sentence on the accuracy that is lost without a test and all its repeats, for each test.
         document: content of plan.json: durations of the runs and expected results, compared with the standard programme
             (the paper's tests, repeated as often as the same hours allow).
     """
@@ -217,7 +217,7 @@ def plan_warnings(search: PlanSearch) -> Iterator[Caveat]:
             f"{' and '.join(knowledge.bounded)} ended at a bound: the planned errors of the other parameters "
             "include half of the additional error of a fit without the bound",
         )
-    if search.goals and not search.determines_scatter(counts):
+    if search.goals and not search.determines_noise(counts):
         sentence = "repeats are too few to determine the scatter of sweeps"
         yield Caveat("few_repeats", f"{sentence}: intervals may be 1.5 times as wide as planned")
     if effects := search.less_visible_effects(counts):

@@ -40,7 +40,7 @@ RIVALS_APART = (_NINE_OF_TEN + float(np.sqrt(_NINE_OF_TEN**2 + DECISIVE_CHI_SQUA
 #: weight that is used if the first leaves such effects; chosen.
 _PENALTY, _STRICT_PENALTY = 3.0, 30.0
 #: Wanted degrees of freedom of the scatter of sweeps; chosen: with five, errors are a tenth larger than planned.
-_SCATTER_FREEDOM = 10
+_NOISE_FREEDOM = 10
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,11 +115,11 @@ class PlanSearch:
             starts = [counts, *([] if required.any() else [standard])]
             choices = (best_runs(self, start, required) for start in starts)
             counts = min(choices, key=self.objective)
-        return self.with_scatter(self.with_repeats(counts))
+        return self.with_noise_repeats(self.with_repeats(counts))
 
     @cached_property
     def runs(self) -> list[int]:
-        """Test indices of the chosen runs in an order in which a drift of the gain hardly shifts the parameters.
+        """Test index of each chosen run, in an order in which a drift of the gain hardly shifts the parameters.
 
         Runs are grouped by direction. Each direction begins and ends with its most repeated test, and the runs between
         are mirrored about the middle, so that the repeats of a test are spread over the session.
@@ -222,7 +222,7 @@ class PlanSearch:
         testable = [goal for goal in self.goals if goal.place in self.request.places]
         if not self.goals or not reached or any(self.untested_warning(goal, counts) for goal in testable):
             return False
-        return not with_checks or (not self.less_visible_effects(counts) and self.determines_scatter(counts))
+        return not with_checks or (not self.less_visible_effects(counts) and self.determines_noise(counts))
 
     def untested_warning(self, goal: PlannedQuantity, counts: Array) -> Caveat | None:
         """Warning that no test in a target's direction shows the error of its stiffness formula.
@@ -251,7 +251,7 @@ class PlanSearch:
         return list(dict.fromkeys(self.effects[index].name for index in np.flatnonzero(short)))
 
     def with_repeats(self, counts: Array) -> Array:
-        """Repeat one test in each direction with more than two tests, so that repeats show drift and noise.
+        """Add a repeat of one test in each direction with more than two tests, to show drift and noise.
 
         Args:
             counts: number of runs of each test, (tests,).
@@ -266,24 +266,24 @@ class PlanSearch:
                 counts = min(self.with_one_repeat(counts, quickest), key=self.objective, default=counts)
         return counts
 
-    def with_scatter(self, counts: Array) -> Array:
-        """Repeat sweeps until a fit can separate the scatter of points from the differences between runs.
+    def with_noise_repeats(self, counts: Array) -> Array:
+        """Repeat sweeps until their repeats determine the random noise of points, apart from differences of runs.
 
         Args:
             counts: number of runs of each test, (tests,).
 
         Returns:
-            Number of runs of each test, (tests,). Unless there are targets, the errors grow by at most a twentieth.
+            Number of runs of each test, (tests,). Unless there are targets, the errors grow by at most 5 %.
         """
         # 0.1 in the logarithm of the variance is a twentieth of the error
         largest = np.inf if self.goals else self.objective(counts) + 0.1
-        while not self.determines_scatter(counts):
-            freedom = self.scatter_freedom(counts)
+        while not self.determines_noise(counts):
+            freedom = self.noise_freedom(counts)
             sweeps = [test for test in np.flatnonzero(counts).tolist() if freedom_per_repeat(self.tests[test])]
             choices = [
                 runs
                 for runs in self.with_one_repeat(counts, sweeps)
-                if self.scatter_freedom(runs) > freedom and self.objective(runs) <= largest
+                if self.noise_freedom(runs) > freedom and self.objective(runs) <= largest
             ]
             if not choices:
                 break
@@ -291,7 +291,7 @@ class PlanSearch:
         return counts
 
     def with_one_repeat(self, counts: Array, tests: Iterable[int]) -> Iterator[Array]:
-        """Generate variants of a choice of tests: in each, one of the given tests has one more run.
+        """Yield variants of a plan: in each, one of the given tests has one more run.
 
         Tests with a single run are dropped, the least useful first, until the repeat fits into the hours.
 
@@ -313,14 +313,14 @@ class PlanSearch:
             if self.budget.total_minutes(runs) <= self.budget.maximum_minutes:
                 yield runs
 
-    def scatter_freedom(self, counts: Array) -> list[int]:
-        """Count the degrees of freedom with which repeats determine the scatter of sweeps, with the tests so far.
+    def noise_freedom(self, counts: Array) -> list[int]:
+        """Degrees of freedom with which repeats, of the tests so far too, determine the random noise of sweeps.
 
         Args:
             counts: number of runs of each test, (tests,).
 
         Returns:
-            Degrees of freedom for the bushing and for each specimen, in ascending order, capped at the wanted number.
+            Degrees of freedom for the bushing and for each specimen, in ascending order, at most the number required.
         """
         runs = Counter(self.knowledge.tests)
         runs.update({test: int(n) for test, n in zip(self.tests, counts, strict=True) if n})
@@ -329,11 +329,11 @@ class PlanSearch:
             if isinstance(test, SimulatedSweep):
                 specimen = None if test.direction.axis else test.direction
                 freedom[specimen] += freedom_per_repeat(test) * (count - 1)
-        return sorted(min(n, _SCATTER_FREEDOM) for n in freedom.values())
+        return sorted(min(n, _NOISE_FREEDOM) for n in freedom.values())
 
-    def determines_scatter(self, counts: Array) -> bool:
-        """True if the repeats among `counts` runs, (tests,), determine the scatter of sweeps well enough."""
-        return self.scatter_freedom(counts) >= [_SCATTER_FREEDOM]
+    def determines_noise(self, counts: Array) -> bool:
+        """True if the repeats among `counts` runs, (tests,), determine the random noise of sweeps well enough."""
+        return self.noise_freedom(counts) >= [_NOISE_FREEDOM]
 
     def error_covariance(self, counts: Array) -> Array:
         """Covariance of the parameters' relative errors, (k, k), after `counts` runs of each test, (tests,)."""
@@ -346,7 +346,10 @@ class PlanSearch:
 
     @cached_property
     def weight(self) -> Array | None:
-        """Matrix W, (k, k), of the objective trace(W C) with the parameters' covariance C; None to separate rivals."""
+        """Weights W, (k, k), of the objective ln trace(W C), C the covariance of the parameters' relative errors.
+
+        None if the aim is to separate rival models: the objective is then the entropy that remains between them.
+        """
         if self.request.aim == "rivals":
             return None
         if self.request.aim == "targets":

@@ -24,24 +24,24 @@ _NEARLY = 1.1
 
 @dataclass(frozen=True, eq=False)
 class PlannedQuantity:
-    """Parameter, or predicted stiffness or loss factor, with what is needed to compute its error for any set of tests.
+    """Parameter, stiffness or loss factor that a plan shall determine; converts parameter errors to errors of it.
 
-    A prediction has n operating points, a parameter one; the k parameters include the parameters at a bound. All errors
-    are relative to the value of the quantity.
+    A prediction has n operating points, a parameter one. With the covariance C of the relative errors of the k
+    parameters (those at a bound included), the relative variance at a point is scale^2 row C row^T + model_error^2, and
+    the half width of its relative 95 % interval is undecided + 1.96 times the root of this variance.
 
     Args:
         name: "mu", "stiffness.axial" or "loss_factor.axial".
-        value: factor that converts relative to reported errors at each point: the loss factor, or 1 for other
-            quantities, (n,).
+        value: factor from relative errors to the errors that the plan reports: the loss factor at each point, whose
+            absolute error is reported, or 1, (n,).
         rows: derivatives of ln|K|, of the phase [rad] for a loss factor, or of the logarithm of a parameter, with
             respect to the relative change of each parameter, (n, k).
-        scale: relative change of the quantity per change of the phase: (1 + loss^2)/loss for a loss factor; 1 for other
-            quantities, (n,).
-        model_error: standard error due to the model error, which no test lowers, (n,).
-        undecided: addition to the half width of the 95 % interval, because the tests cannot distinguish several
-            explanations, (n,).
+        scale: factor from the error of the phase [rad] to the relative error of the loss factor, (1 + loss^2)/loss; 1
+            for other quantities, (n,).
+        model_error: relative standard error due to the error of the model, which no test lowers, (n,).
+        undecided: addition to the half width, because tests cannot distinguish several explanations, (n,).
         prediction: prediction with these operating points; None for a parameter.
-        target: largest half width of the 95 % interval that the user allows; infinite without a target.
+        target: largest relative half width of the 95 % interval that the user allows; infinite without a target.
     """
 
     name: str
@@ -115,7 +115,7 @@ class PlannedQuantity:
         return self.half_width(error_covariance) <= self.target * (1.0 + 1e-9)
 
     def nearly_meets_target(self, error_covariance: Array, limit: Array) -> bool:
-        """True if tests meet the target, or come nearly as close to it as unlimited tests would.
+        """True if tests meet the target, or miss it by at most 1.1 times the half width of unlimited tests.
 
         Args:
             error_covariance: covariance of the parameters with the tests, (k, k).

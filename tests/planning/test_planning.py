@@ -31,7 +31,7 @@ from tests.fits import residual, solve
 
 AXIAL, RADIAL = Direction.AXIAL, Direction.RADIAL
 BAND = (5.0, 20.0, 60.0, 150.0)
-NOISE = Noise(scatter=(4e-3, 6e-3), shared=(5e-3, 3e-3), level=(7e-3, 2e-3), rows_as_one=1.0)
+NOISE = Noise(random=(4e-3, 6e-3), shared=(5e-3, 3e-3), level=(7e-3, 2e-3), rows_as_one=1.0)
 SWEEPS = (
     SimulatedSweep(AXIAL, (2e-4,), BAND),
     SimulatedSweep(RADIAL, (1e-4,), BAND[::3]),
@@ -88,7 +88,7 @@ def test_the_information_is_that_of_the_full_covariance_of_all_points(known):
         run = np.repeat(np.arange(count), slopes.shape[-1] // max(count, 1))
         for part in (0, 1):
             covariance = NOISE.level[part] ** 2 + NOISE.shared[part] ** 2 * (run[:, None] == run)
-            covariance += NOISE.scatter[part] ** 2 * np.eye(run.size)
+            covariance += NOISE.random[part] ** 2 * np.eye(run.size)
             found = found + slopes[:, part] @ np.linalg.solve(covariance, slopes[:, part].T)
     told = view_of(known, TESTS).total(counts).parameters[0]
     assert list(known.names) == list(known.model.parameters)
@@ -107,10 +107,10 @@ def test_the_gain_of_a_loop_is_no_surer_than_the_class_of_the_rig(known):
 
 def _noise_free(model: Model, truth: Model, test: SimulatedSweep) -> MeasuredSweep:
     """One run of a sweep, as the truth has it."""
-    sweep = planned_sweep(model, test.direction, *operating_points(test), NOISE.scatter, NOISE.shared)
+    sweep = planned_sweep(model, test.direction, *operating_points(test), NOISE.random, NOISE.shared)
     if test.stepped == "amplitude":
         held = replace(sweep.test, stepped="amplitude")
-        noise = replace(sweep.noise, random={("new", test.frequencies[0]): NOISE.scatter})
+        noise = replace(sweep.noise, random={("new", test.frequencies[0]): NOISE.random})
         sweep = replace(sweep, test=held, noise=noise)
     return sweep.noise_free(truth)
 
