@@ -28,7 +28,7 @@ AddEffect = Callable[[Model, str, Direction, float, np.random.Generator], Model]
 
 
 def random_model(rng: np.random.Generator) -> Model:
-    """Make the paper's model of a random bushing of random rubber."""
+    """Make a model (elastic, springpot, friction) of a random bushing with random but typical parameters of rubber."""
     inner = rng.uniform(6e-3, 22e-3)
     bushing = Bushing("random", inner, inner * rng.uniform(1.3, 2.2), rng.uniform(20e-3, 70e-3))
     ranges = {"mu": (0.6e6, 2e6), "m": (0.8e5, 3.5e5), "alpha": (0.15, 0.3), "sigma_fmax": (5e3, 3e4)}
@@ -37,7 +37,7 @@ def random_model(rng: np.random.Generator) -> Model:
 
 
 def operating_point(model: Model, rng: np.random.Generator) -> tuple[Direction, float, float]:
-    """Draw a direction, a frequency [Hz] of 5 to 155 Hz, and an amplitude [m] of 0.3 to 6 % strain."""
+    """Draw a direction (axial or radial), a frequency from 5 to 155 [Hz], and an amplitude of 0.3 to 6 % strain [m]."""
     direction = list(Direction)[rng.integers(2)]
     frequency, strain = float(rng.uniform(5.0, 155.0)), 10 ** rng.uniform(-2.5, -1.2)
     return direction, frequency, strain / model.unit_strain(direction)

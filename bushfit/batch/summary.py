@@ -118,7 +118,7 @@ class BatchResult:
 
     @cached_property
     def curves(self) -> dict[str, Array]:
-        """Columns of measured |K| for the batch table, by header: a value for each of the n parts, NaN if not measured.
+        """Columns of measured |K| for the batch table, by header: a value per part, (n,), NaN if not measured.
 
         There is a column for each point of the measured stiffness curve that most parts have in common.
         """

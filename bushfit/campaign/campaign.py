@@ -215,7 +215,7 @@ def model_of(campaign: Campaign) -> Model:
         Model with the parameters and effects of the [simulate] table.
 
     Raises:
-        CampaignError: no [simulate] table, or one of the paper's five parameters without a value.
+        CampaignError: no [simulate] table, or no value of mu, m, alpha, sigma_fmax or eps_half.
         ModelError: an unknown effect or an impossible value.
     """
     if campaign.simulate is None:
@@ -304,7 +304,7 @@ def reader_keywords(
 
 
 def with_unit_of_zero(tests: Sequence[AnyTest], units: Mapping[Place, str]) -> tuple[AnyTest, ...]:
-    """Copy tests so that a preload of zero ("none") has the unit of the other preloads of its direction.
+    """Copies of tests in which a preload of zero ("none") has the unit of the other preloads of its direction.
 
     Args:
         tests: loops or sweeps.

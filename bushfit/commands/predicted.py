@@ -184,7 +184,7 @@ def by_direction(parts: Sequence[Part]) -> list[list[Part]]:
 
 
 def joined_table(make: Callable[[Part], pd.DataFrame], parts: Sequence[Part]) -> pd.DataFrame:
-    """Join the tables, made by `make`, of predictions or static curves at several preloads, one below the other."""
+    """Join tables of predictions or static curves at several preloads, one below the other; `make` makes a table."""
     return pd.concat([make(part) for part in parts], ignore_index=True)
 
 

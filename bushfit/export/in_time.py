@@ -128,7 +128,7 @@ def fields_of(effect: Effect) -> list[str]:
 
 
 def middle_point(prediction: Prediction) -> tuple[float, float]:
-    """Geometric middle of the frequency range [Hz] and of the amplitude range [m, rad or 1] of a prediction."""
+    """Geometric mean of lowest and highest frequency [Hz], and that of the amplitudes [m, rad or 1] of a prediction."""
     frequency, amplitude = (float(np.sqrt(x.min() * x.max())) for x in (prediction.frequency, prediction.amplitude))
     return frequency, amplitude
 

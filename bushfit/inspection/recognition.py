@@ -73,7 +73,7 @@ def recognize_table(file: Path, test_options: Mapping[str, Any]) -> tuple[Table,
         direct = [pair for pair in PAIRS if pair[0] != "force_amplitude"]
 
         def rank(candidate: tuple[Table, bool]) -> tuple[bool, bool, int, int]:
-            """Order of preference of a table that is a loop or a sweep."""
+            """Key that sorts candidates (table, and True for a sweep): the smallest is preferred."""
             table, is_sweep = candidate
             is_direct = any({*pair} <= {*table.roles} for pair in direct)
             return not is_sweep, not is_direct, count_other_units(table), -len(table.roles)

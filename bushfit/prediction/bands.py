@@ -58,7 +58,8 @@ class Band:
 def car_models(model: Model, unresolved: Sequence[str]) -> list[Model]:
     """List the models that may describe the bushing away from the test rig, as in a car.
 
-    Effects of the rig are left out; each model has a different subset of the unresolved effects.
+    Effects of the rig are left out. If the tests do not show whether an effect belongs to the bushing or to the rig
+    (it is unresolved), there is a model with and one without the effect.
 
     Args:
         model: fitted model.

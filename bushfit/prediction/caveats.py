@@ -52,7 +52,8 @@ def caveats(result: Result) -> Iterator[Caveat]:
         result: fitted result.
 
     Yields:
-        Warnings: unfitted directions, unresolved effects, and the limits of the model.
+        Warnings on directions that were not fitted, on effects that may belong to the bushing or to the rig, and on the
+        limits of the model.
     """
     for place in result.fitted_places:
         yield from unfitted_warnings(result, place)

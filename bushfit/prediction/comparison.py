@@ -83,7 +83,7 @@ class Comparison:
 
     @cached_property
     def largest_errors(self) -> Array:
-        """Largest error over all points, in half widths of the pointwise 95 % band, in random draws (fixed seed).
+        """Largest error over all points in each of d random draws (fixed seed), in half widths of the 95 % band, (d,).
 
         Notes: the correlations of the errors are known (T. Hothorn, F. Bretz, P. Westfall, Biometrical J. 50 (2008)
         346). If no error is known, a single draw of 0.
@@ -254,8 +254,8 @@ def _describe_difference(band: Band, unit: str, contrast: Contrast) -> str:
         contrast: the compared stiffness, with its operating points.
     """
 
-    def figures(i: int, word: str) -> str:
-        """Difference at one point without sign, its interval, and "higher" or "lower"."""
+    def describe(i: int, word: str) -> str:
+        """Text on the difference at point `i`, such as "1.2 % (0.8 to 1.6) higher"; `word` is "higher" or "lower"."""
         value, ends = abs(band.value[i]), sorted((abs(band.low[i]), abs(band.high[i])))
         digits = int(np.clip(np.floor(np.log10(value)) - np.floor(np.log10(ends[1] - ends[0])) + 1, 2, _MOST_DIGITS))
         texts = format_aligned([value, *ends], digits)
@@ -270,11 +270,11 @@ def _describe_difference(band: Band, unit: str, contrast: Contrast) -> str:
             size = np.where(sure, np.abs(band.value), np.nan)
             top, bottom = int(np.nanargmax(size)), int(np.nanargmin(size))
             alike_all = sure.all() and min(abs(band.low[top]), abs(band.high[top])) <= size[bottom]
-            parts.append(f"{figures(top, word)} {'throughout' if alike_all else f'at {_format_point(contrast, top)}'}")
+            parts.append(f"{describe(top, word)} {'throughout' if alike_all else f'at {_format_point(contrast, top)}'}")
             if 1 < (count := int(sure.sum())) < sure.size:
                 parts[-1] += f" ({word} at {count} of {sure.size} points)"
             if sure.all() and not alike_all:
-                smallest = f"{figures(bottom, word)} at {_format_point(contrast, bottom)}"
+                smallest = f"{describe(bottom, word)} at {_format_point(contrast, bottom)}"
                 parts[-1] = f"{smallest}, up to {parts[-1]}"
     none = (band.low <= 0.0) & (band.high >= 0.0)
     if none.any():

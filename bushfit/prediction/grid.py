@@ -216,7 +216,7 @@ def measured_levels(sweeps: Sequence[Sweep], axis: Literal["frequency", "amplitu
 
 
 def _geometric_values(low: float, high: float, count: int) -> Array:
-    """Make `count` values from `low` to `high` in equal ratios, rounded to three digits; equal values are merged."""
+    """Values from `low` to `high` in equal ratios, to three digits, (count,); fewer if values within 1 % are merged."""
     return _distinct(np.array([float(f"{x:.3g}") for x in np.geomspace(low, high, count)]))
 
 

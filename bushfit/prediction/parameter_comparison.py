@@ -188,5 +188,5 @@ def holm(probabilities: Sequence[float]) -> list[float]:
 
 
 def relative_difference(logarithm: Array) -> Array:
-    """Convert natural logarithms of ratios, limited to +-ln(1e10), to relative differences: exp(logarithm) - 1."""
+    """Relative differences, exp(logarithm) - 1, (...), of natural logs of ratios, (...), limited to +-ln(1e10)."""
     return np.expm1(np.clip(logarithm, -_FURTHEST, _FURTHEST))

@@ -46,7 +46,8 @@ class PredictedResonance(PredictedPlace):
         stiffness: complex stiffness of the bushing at each frequency and amplitude [N/m], (n,).
         warnings: warnings on a direction that was not fitted, on frequencies and strains near the peak outside the
             fitted range, and on unresolved effects.
-        if_in_rig: response if the unresolved effects belong to the rig, not to the bushing; None without such effects.
+        if_in_rig: response if the unresolved effects, which may belong to the bushing or to the rig, belong to the rig;
+            None without such effects.
         conditions: temperature [K] and preload of the rubber; None for a condition that the model does not depend on.
     """
 

@@ -200,7 +200,7 @@ def _corrected_force(force: Array, model: Model, place: Place, history: History,
 
 
 def _tested_strains(result: Result) -> tuple[float, float] | None:
-    """Largest strain [1] and strain rate [1/s] of the tests to which a result was fitted; None without tests."""
+    """Two numbers: largest strain [1] and strain rate [1/s] of the fitted tests; None if nothing was fitted."""
     if result.measured is None:
         return None
     fitted = (place for place in result.fitted_places if result.model.bushing or isinstance(place, Specimen))

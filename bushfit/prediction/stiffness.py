@@ -56,8 +56,8 @@ class Prediction(PredictedPlace):
         storage_stiffness, loss_stiffness: K' and K'', in the unit of |K|.
         warnings: warnings on directions, frequencies and strains that were not fitted, on excluded effects of the rig,
             and on unresolved effects.
-        if_in_rig: prediction if the unresolved effects belong to the rig, not to the bushing; the bands include it.
-            None without unresolved effects.
+        if_in_rig: prediction if the unresolved effects, which may belong to the bushing or to the rig, belong to the
+            rig; the bands include it. None without unresolved effects.
         measured: measured complex stiffness at these points, mean of the repeats, in the unit of |K|, (n,); nan at a
             point without a measurement; None without sweeps.
         conditions: temperature [K] and preload of the rubber; None for a condition that the model does not depend on.
@@ -102,8 +102,8 @@ def predict(
 ) -> Prediction:
     """Predict the dynamic stiffness on a grid, with 95 % bands from the covariance of the fit (delta method).
 
-    The bands span all models that agree with the tests: with and without the unresolved effects, and with each of the
-    effects that the tests cannot distinguish.
+    The bands span all models that agree with the tests: with and without effects that may belong to the bushing or to
+    the rig, and with each of the effects that the tests cannot distinguish.
 
     Args:
         result: fitted result.

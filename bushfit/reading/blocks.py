@@ -277,7 +277,11 @@ def _stacked_blocks(source: RowSource, layout: Layout, vocabulary: Vocabulary) -
 
 
 def _with_plain_cells(source: RowSource, layout: Layout) -> tuple[RowSource, Layout]:
-    """Split columns whose cells contain a complex number, a magnitude and angle, a unit or an uncertainty."""
+    """Split columns whose cells contain a complex number, a magnitude and angle, a unit or an uncertainty.
+
+    Returns:
+        Sheet and layout with a number per cell; `source` and `layout` unchanged without such columns.
+    """
     source, layout = _with_units_in_cells(source, layout)
     width = len(layout.headers)
 

@@ -121,7 +121,7 @@ def read_displacements(
 
 
 def even_time(time: Floats) -> tuple[Floats, tuple[Caveat, ...]]:
-    """Space the times of a record evenly.
+    """Space the times of a record [s], (n,), evenly.
 
     Returns:
         Even times [s], (n,); and a warning if the recorded times deviate from them by more than rounding.

@@ -331,8 +331,8 @@ def _split_off(text: str, patterns: Sequence[tuple[re.Pattern[str], Meant]]) -> 
 def parse_unit(text: str) -> tuple[str, AmplitudeConvention | None, float]:
     """Parse a unit that may contain an amplitude convention ("mm p-p") or a logarithm ("log10(Pa)", "dB re 1 N/mm").
 
-    Returns the bare unit, the convention or None, and the base of the logarithm, 0 without one. The base of dB is
-    10^(1/20).
+    Returns:
+        Bare unit, convention or None, and base of the logarithm: 0 without one, 10^(1/20) for dB.
     """
     base = 0.0
     if match := _LOGARITHM_OF_UNIT.fullmatch(text):

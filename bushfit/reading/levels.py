@@ -79,7 +79,7 @@ class ConditionColumn:
         return f"{mean:.1f} degC" if self.unit == "degC" else f"{number(mean, 4)} {self.unit}"
 
     def groups(self, rows: NDArray[np.intp]) -> list[NDArray[np.intp]]:
-        """Divide rows, given by their indices, where the sorted values have a step; groups are in ascending order."""
+        """Divide row indices, (n,), where their sorted values have a step; groups are in ascending order of value."""
         ordered = rows[np.argsort(self.values[rows], kind="stable")]
         groups = np.split(ordered, np.flatnonzero(np.diff(self.values[ordered]) > self.step) + 1)
         return [np.sort(group) for group in groups]

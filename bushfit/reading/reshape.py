@@ -161,7 +161,7 @@ def _exchange_rows(source: RowSource, layout: Layout, vocabulary: Vocabulary) ->
         return None
 
     def count_texts(line: Line) -> int | None:
-        """Number of texts in front of the numbers of a row that has both, and nothing behind; None for other lines."""
+        """Number of texts before the numbers of a row such as "f; Hz; 1; 2; 5" (2); None for any other line."""
         first = next((index for index, cell in enumerate(line.content) if is_like_number(str(cell))), 0)
         numbers = [str(cell) for cell in line.content[first:] if cell != ""]
         is_named = any(line.content[:first]) and len(line.content) - first > 2 and all(map(is_like_number, numbers))

@@ -99,9 +99,9 @@ def runs_of(
 
 
 def nominal_amplitudes(amplitude: Floats) -> Floats:
-    """Replace each reached amplitude, (n,), by its nominal level: the median of a narrow group of amplitudes.
+    """Nominal level of each reached amplitude, (n,): the median of a narrow group of amplitudes, in the same unit.
 
-    Returns the amplitudes themselves if wide gaps do not separate them into narrow groups of several points.
+    The amplitudes are returned unchanged if wide gaps do not separate them into narrow groups of several points.
     """
     distinct, index = np.unique(amplitude, return_inverse=True)
     logs = np.log(distinct)

@@ -194,7 +194,8 @@ class TestFile(FileFormat):
         Args:
             place: direction of the bushing, or the specimen.
             sha256: SHA-256 of the file in hexadecimal digits.
-            degrees: recorded temperatures [degC], whose mean is used if no temperature is stated; None without any.
+            degrees: recorded temperatures [degC], (n,), whose mean is used if no temperature is stated; None if
+                not recorded.
             notes: warnings on how the file was read.
 
         Returns:

@@ -86,9 +86,9 @@ def are_day_numbers(values: Floats) -> bool:
 
 
 def spread(time: Floats) -> Floats | None:
-    """Return evenly spaced times [s], (n,), for recorded times that were rounded, so that values repeat.
+    """Evenly spaced times [s], (n,), for recorded times [s], (n,), that were rounded, so that values repeat.
 
-    Returns None if time decreases, or if no even sampling rounds to these times.
+    None if time decreases, or if no even sampling rounds to these times.
 
     Notes:
         With q the smallest step between different times, an even clock t0 + i dt is rounded to within q. The line

@@ -296,9 +296,11 @@ def select_steady_cycles(motion: Complex, stiffness: Complex, fewest: int) -> sl
 
 
 def _truncation(series: Complex, most_cut: int) -> int:
-    """Number of values to cut at the start of k series, (k, m), so that the standard error of their means is smallest.
+    """Number of values to cut at the start of several series so that the standard error of their means is smallest.
 
-    At most `most_cut` values are cut, the same number from each series.
+    Args:
+        series: k series of equal length, (k, m); the same number of values is cut from each.
+        most_cut: largest number of values to cut.
     """
     if most_cut < 1:
         return 0

@@ -93,7 +93,7 @@ def resolved_order(rows_per_cycle: float, max_order: int) -> int:
 
 
 def spread_rows(rows: int, max_rows: int) -> NDArray[np.intp]:
-    """Select up to `max_rows` row indices, spread evenly but not periodically over `rows` rows."""
+    """Indices of up to `max_rows` of `rows` rows, ascending, spread evenly but not periodically, (max_rows,)."""
     count = min(rows, max_rows)
     number = np.arange(count)
     golden = 0.6180339887498949  # ratio less 1: its multiples, less whole numbers, spread evenly

@@ -210,7 +210,7 @@ def _spans_of_part(time: Floats, motion: Floats, turns: Integers, noise: float) 
     Args:
         time: time of each row [s], or row numbers, (n,).
         motion: displacement without outliers [m or rad], (n,).
-        turns: row indices of the turning points, and of both ends.
+        turns: row indices of the turning points, and of both ends, (turns,).
         noise: smallest stroke that is not noise [m or rad].
     """
     if turns.size < 4:

@@ -57,7 +57,7 @@ def reversal_rows(values: Floats, rows: Integers) -> Integers:
 
     Args:
         values: values of a channel, (n,).
-        rows: row indices, increasing.
+        rows: row indices, increasing, (k,).
     """
     return np.concatenate((rows[:1], rows[:-1][reversals(values[rows])], rows[1:][-1:]))
 

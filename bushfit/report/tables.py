@@ -29,7 +29,7 @@ IF_RIGS = "if caused by the rig"
 
 
 def quantity_words(place: Place) -> tuple[str, str, str]:
-    """Words for amplitude, force and stiffness in headers: for a modulus "strain amplitude", "stress", "modulus"."""
+    """Words for headers: "amplitude", "force", "stiffness", or "strain amplitude", "stress", "modulus"."""
     if place.motion is not STRAINING:
         return "amplitude", "force", "stiffness"
     strain, stress, modulus = STRAINING.words
@@ -37,7 +37,7 @@ def quantity_words(place: Place) -> tuple[str, str, str]:
 
 
 def response_headers(place: Place) -> tuple[str, str, str]:
-    """Column headers, with units, of amplitude, stiffness magnitude and force for a direction or specimen."""
+    """Headers of amplitude, stiffness and force, such as ("amplitude [mm]", "stiffness [N/mm]", "force [N]")."""
     (length, _), (force, _), (stiffness, _) = place.display
     motion_name, resisting, resisted = quantity_words(place)
     return f"{motion_name} [{length}]", f"{resisted} [{stiffness}]", f"{resisting} [{force}]"
@@ -67,7 +67,7 @@ def response_columns(place: Place, stiffness: Array, before: str = "") -> dict[s
 
 
 def band_columns(header: str, band: Band, factor: float = 1.0) -> dict[str, Array]:
-    """Table columns of a predicted quantity and of the ends of its 95 % band, by their headers.
+    """Table columns of a predicted quantity and of both ends of its 95 % band, by header, (n,) each.
 
     Args:
         header: header of the quantity; ", low" and ", high" are added for the ends of the band.
@@ -147,8 +147,8 @@ def predicted_resonance_table(resonance: PredictedResonance) -> pd.DataFrame:
         resonance: predicted response of the mass over frequency.
 
     Returns:
-        A row per frequency: transmissibility, phase, deformation amplitude, stiffness and loss factor; the same again
-        under the assumption that an unresolved effect belongs to the rig, if there is one.
+        A row per frequency: transmissibility, phase, deformation amplitude, stiffness and loss factor. If the tests do
+        not show whether an effect belongs to the bushing or the rig, the same again as if it belongs to the rig.
     """
     table = pd.DataFrame(
         {

@@ -228,7 +228,7 @@ def loop_labels(place: Place, loops: dict[str, pd.DataFrame]) -> list[str]:
 
 
 def _drawn_rows(loop: pd.DataFrame) -> Array:
-    """Indices of at most about 240 rows of the first two and last two cycles of a loop, evenly spaced."""
+    """Indices of the rows of a loop to draw, (n,): about 240 at most, from the first two and last two cycles."""
     turns = (loop["time [s]"] * loop["frequency [Hz]"]).to_numpy()
     rows = np.flatnonzero((turns < turns[0] + 2.0) | (turns > turns[-1] - 2.0))
     return rows[:: max(1, -(-rows.size // _MOST_ROWS))]

@@ -151,7 +151,7 @@ def color_scale(sweeps: pd.DataFrame, sides: Sequence[str]) -> tuple[Array, Scal
         sides: columns of the figure, "before" and "after".
 
     Returns:
-        Percentages at which the colour changes, ascending, and the colours between and beyond them.
+        Percentages at which the colour changes, ascending, (k,); and the map from percentages to k + 1 colours.
     """
     values = np.abs(sweeps[[f"{part} {side} [%]" for part in ("storage", "loss") for side in sides]].to_numpy())
     needed = int(np.searchsorted(_EDGES, np.nanquantile(values, 1.0 - _BEYOND))) + 1
@@ -201,9 +201,13 @@ def draw_map(axes: Axes, group: SweepGroup, rows: Sequence[Curve], header: str, 
 
 
 def cell_edges(values: Array, *, logarithmic: bool) -> tuple[Array, Array]:
-    """Lower and upper edges of the map cells of ascending values, (n,) each: half way to the neighbours.
+    """Lower and upper edges, (n,) each, of the cells of a map, half way between neighbouring values.
 
     If one neighbour is much further away than the other, a point is missing and the nearer neighbour sets both edges.
+
+    Args:
+        values: ascending frequencies or amplitudes of the cells in the unit of the axis, (n,).
+        logarithmic: True for a logarithmic axis; half way is then the geometric mean.
     """
     x = np.log(values) if logarithmic else values
     steps = np.diff(x) if x.size > 1 else np.array([0.2 if logarithmic else 0.2 * x[0]])

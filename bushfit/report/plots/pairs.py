@@ -47,7 +47,7 @@ class ResponsePair:
         style.label_axes(panels[1], x_label, f"{place} loss factor [-]", x)
 
     def values(self, stiffness: Array) -> tuple[Array, Array]:
-        """Values in the left and in the right panel, (n,) each, of complex stiffnesses [SI], (n,)."""
+        """Stiffness magnitude in the unit of the left panel, and loss factor, (n,) each, of complex stiffness [SI]."""
         return self.factor * np.abs(stiffness), loss_factor(stiffness)
 
     def plot(self, x: Array, stiffness: Array, *form: str, **options: Any) -> None:
