@@ -235,7 +235,7 @@ def resolve_limits(limits: Limits, values: Mapping[str, Array]) -> tuple[dict[st
 
 
 def describe_poor_fit(record: RowFile, limits: Limits | None) -> str:
-    """Sentence on a fit that misses its tests by more than noise and by more than the allowed NRMSE; else empty."""
+    """Sentence on a poor fit: NRMSE above its limit (default 5 %) and reduced chi-square of 2 or more; else empty."""
     nrmse, chi_square = (record.quantities.get(quantity.name) for quantity in FIT_QUALITY.values())
     largest = POOR_FIT if limits is None or limits.nrmse is None else limits.nrmse
     if not nrmse or nrmse.value <= largest or (chi_square and chi_square.value < _BEYOND_NOISE):
@@ -314,7 +314,7 @@ def limit_sentence(
     Returns:
         The sentence, in the display unit of the value.
     """
-    displayed = quantity.displayed(estimate.value)
+    displayed = quantity.in_display_unit(estimate.value)
     ends = [number(end * displayed.factor, 4) for end in (estimate.low, estimate.high) if end is not None]
     finite = [limit for limit in allowed if math.isfinite(limit)]
     unit = f" {displayed.unit}" if displayed.unit != "-" else ""

@@ -100,14 +100,14 @@ class PartQuantity:
     unit: str
     factor: float = 1.0
 
-    def displayed(self, value: float) -> PartQuantity:
+    def in_display_unit(self, value: float) -> PartQuantity:
         """Copy of the quantity with the display unit for a value of this magnitude [SI], such as MPa for 2e6 Pa."""
         return PartQuantity(self.name, *display_unit(self.unit, self.factor, value))
 
     @property
-    def tabled(self) -> PartQuantity:
+    def in_table_unit(self) -> PartQuantity:
         """Copy of the quantity in the unit of its table column, which for a parameter is that of a typical value."""
-        return self.displayed(get_parameter(self.name).typical) if is_parameter(self.name) else self
+        return self.in_display_unit(get_parameter(self.name).typical) if is_parameter(self.name) else self
 
     @property
     def header(self) -> str:

@@ -97,7 +97,7 @@ class BatchResult:
 
     @cached_property
     def is_poor(self) -> Array:
-        """True for each part whose fitted model misses its tests by more than noise and the allowed NRMSE, (n,)."""
+        """True for each part with a poor fit (NRMSE above its limit, reduced chi-square of 2 or more), (n,)."""
         return np.array([bool(describe_poor_fit(record, self.plan.limits)) for record in self.records])
 
     @cached_property
@@ -164,7 +164,7 @@ class BatchResult:
     @cached_property
     def document(self) -> BatchFile:
         """Content of `batch.json`, the JSON file of the whole batch."""
-        columns = {name: quantity.tabled for name, quantity in self.quantities.items() if name in self.estimates}
+        columns = {name: quantity.in_table_unit for name, quantity in self.quantities.items() if name in self.estimates}
         parts = [self.part_table(index, columns) for index in range(len(self.records))]
         counts = {name: int(np.isfinite(values).sum()) for name, (values, _) in self.compared_values.items()}
         count = max((counts[name] for name in counts if name != _CURVE), default=counts.get(_CURVE, 0))
@@ -353,7 +353,7 @@ class BatchResult:
             endings = _PARAMETER_COLUMNS if is_parameter(name) else {"": 0} if name in FIT_NAMES else _POINT_COLUMNS
             for ending, line in endings.items():
                 figures = self.estimates.get(name, unknown)[line]
-                columns[quantity.tabled.header + ending] = figures * quantity.tabled.factor
+                columns[quantity.in_table_unit.header + ending] = figures * quantity.in_table_unit.factor
         columns["at bound"] = bounds
         columns["warnings"] = [" | ".join(record.warnings) for record in records]
         columns["campaign name"], columns["subgroup"] = last

@@ -67,7 +67,7 @@ def copied_points(sweeps: Sequence[Sweep]) -> dict[tuple[int, int], list[int]]:
 
 def without_copied_loops(loops: Sequence[Loop]) -> list[Loop]:
     """Leave out the loops of a campaign that are copies of an earlier loop; a note on that loop names its copies."""
-    return [_with_note(first, _used_once(first, copies)) for first, *copies in group_copies(loops)]
+    return [_with_note(first, _copy_note(first, copies)) for first, *copies in group_copies(loops)]
 
 
 def without_copied_points(sweeps: Sequence[Sweep]) -> list[Sweep]:
@@ -86,7 +86,7 @@ def without_copied_points(sweeps: Sequence[Sweep]) -> list[Sweep]:
     for index, sweep in enumerate(sweeps):
         if is_copy[index].all():
             continue
-        notes = [_used_once(sweep, [sweeps[copy] for copy, first in copies if first == index and is_copy[copy].all()])]
+        notes = [_copy_note(sweep, [sweeps[copy] for copy, first in copies if first == index and is_copy[copy].all()])]
         for (_, original), rows in ((pair, rows) for pair, rows in copies.items() if pair[0] == index):
             repeats = [*map(str, sorted(set(sweep.repeat[rows].tolist())))]
             of_repeats = f" of repeat{'s' * (len(repeats) > 1)} {_join_names(repeats)}" if original == index else ""
@@ -104,7 +104,7 @@ def without_copied_points(sweeps: Sequence[Sweep]) -> list[Sweep]:
     return remaining
 
 
-def _used_once(first: AnyTest, copies: Sequence[AnyTest]) -> Caveat | None:
+def _copy_note(first: AnyTest, copies: Sequence[AnyTest]) -> Caveat | None:
     """Note that names the files (or, within one file, the tests) with copies of a test; None without copies."""
     file = first.source.file if first.source else None
     names = [copy.source.file.name if copy.source and copy.source.file != file else copy.name for copy in copies]

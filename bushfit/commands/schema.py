@@ -78,7 +78,7 @@ def schema(name: str) -> dict[str, Any]:
 
 
 def _generator(way: str) -> Any:
-    """Class of pydantic's schema generator that adds descriptions from docstrings; `way` as in `Described`."""
+    """Make a schema generator class that adds descriptions from docstrings; `way` is "written", "read" or "toml"."""
     from pydantic.json_schema import GenerateJsonSchema
 
     class Generator(GenerateJsonSchema):

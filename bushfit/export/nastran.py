@@ -82,7 +82,7 @@ def _property(
     nominal = {(dof, part): format_real(columns[dof][1 + part][0]) for dof, part in numbers}
 
     def fields(entries: Mapping[tuple[int, int], str]) -> list[str]:
-        """Number of the property; then the name of each table, with its entries by degree of freedom from 1 to 6."""
+        """Fields of a card: property number, then each keyword and its `entries` (key: degree of freedom, 0 or 1)."""
         rows = [[name, *(entries.get((dof, part), "") for dof in range(1, 7))] for part, name in enumerate(names)]
         return [str(pid), *rows[0], "", *rows[1]]
 

@@ -89,7 +89,7 @@ def rig_effects(result: Result) -> list[str]:
 
 
 def agrees_within_noise(result: Result, direction: Place) -> bool:
-    """True if a direction has sweeps that were not fitted and the model agrees with all of them within noise."""
+    """True if a direction has sweeps that were not fitted, each with a reduced chi-square of at most 1.4."""
     misfits = [test for test in result.tests if test.place == str(direction) and test.held is None and not test.fitted]
     return bool(misfits) and all(test.reduced_chi_square <= _AGREEMENT for test in misfits)
 

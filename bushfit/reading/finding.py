@@ -66,7 +66,7 @@ def find_table(
     if len(layouts) > 1:
         layouts = [entry for entry in layouts if len(vocabulary.roles(entry[1].headers) - {"time"}) > 1]
     if len(layouts) != 1:
-        raise opened.no_choice([source for source, _ in layouts])
+        raise opened.part_error([source for source, _ in layouts])
     table = Table(opened, *layouts[0], names, motion)
     if header_line not in (None, table.layout.header_line):
         problem, hint = "there is no header on this line", "lines count from 1"

@@ -389,7 +389,7 @@ def _with_unnamed_columns(layout: Layout, below: Sequence[Sequence[str]]) -> Lay
 
 
 def _below_headers(header: str, row: str) -> list[str]:
-    """Split a row of units at wide gaps (a unit may contain a blank); "" below a header without a unit."""
+    """Unit below each header, "" without one, in two lines whose columns are aligned by blanks: headers and units."""
     spans, cells = ([(*cell.span(), cell[0]) for cell in _CELL.finditer(line.expandtabs())] for line in (header, row))
     by_column = {
         max(range(len(spans)), key=lambda n: min(end, spans[n][1]) - max(start, spans[n][0])): text

@@ -253,8 +253,8 @@ def split_conditions(table: Table, rows: NDArray[np.intp], stated: Mapping[str, 
         stated: keys of the test that the user states; of several levels, only the stated one belongs to the test.
 
     Returns:
-        Texts of temperature and preload of each test by key; a key is missing if the user states it, or if all rows of
-        the file have one level.
+        Texts of each test by key, such as {"temperature": "23.0 degC", "preload": "500 N"}; a key is missing if the
+        user states it, or if all rows of the file have one level.
     """
     tests: list[tuple[dict[str, str], NDArray[np.intp]]] = [({}, rows)]
     points = {role: table.roles[role] for role in ("frequency", "amplitude") if role in table.roles}

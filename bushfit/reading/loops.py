@@ -19,7 +19,7 @@ from bushfit.reading.si_columns import first_numbers, quantity_above, si_column
 from bushfit.reading.source import LEAST_VALUE
 from bushfit.reading.stated import LoopFile
 from bushfit.reading.table import Table
-from bushfit.reading.times import DAY, HOUR, are_day_numbers, sampling_rate_above, spread
+from bushfit.reading.times import DAY, HOUR, are_day_numbers, sampling_rate_above, spread_rounded_times
 
 #: Latest time of a record [s]; chosen: the year 5138 in seconds since 1970, or March 1973 in milliseconds.
 _LATEST_SECOND = 1e11
@@ -199,7 +199,7 @@ def increasing_time(table: Table, column: Column, time: Floats) -> tuple[Floats,
             hint=f'units = {{ time = "{likelier[0]}" }} in the campaign; or subtract the first time from all',
         )
     stuck = time[1:] <= time[:-1]
-    if stuck.any() and (even := spread(time)) is not None:
+    if stuck.any() and (even := spread_rounded_times(time)) is not None:
         rate = (time.size - 1) / (even[-1] - even[0])
         sentence = f'"{column.header}" is rounded and repeats: its rows are spread evenly, at {rate:.6g} Hz'
         return even, (Caveat("rows_spread", sentence),)

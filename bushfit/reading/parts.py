@@ -37,7 +37,7 @@ class OpenedFile:
     parts: Sequence[RowSource]
     located: dict[object, Any] = field(default_factory=dict)
 
-    def no_choice(self, usable: Sequence[RowSource]) -> MeasurementError:
+    def part_error(self, usable: Sequence[RowSource]) -> MeasurementError:
         """Return the error for a file in which no part, or more than one (`usable`), can contain the table."""
         kind = word_for_part(self.file)
         return MeasurementError(

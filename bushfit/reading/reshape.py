@@ -35,7 +35,7 @@ _FIRST_ROWS = 50
 
 
 def reshape_table(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> Sheet | None:
-    """Reshape a table without a column for each quantity.
+    """Reshape a table without a column for each quantity, such as one with a row for each, into one with columns.
 
     Args:
         source: lines or rows of the file.

@@ -85,7 +85,7 @@ def are_day_numbers(values: Floats) -> bool:
     return in_range and 0.0 < float(np.ptp(values)) < _LARGEST_DAY_STEP * values.size
 
 
-def spread(time: Floats) -> Floats | None:
+def spread_rounded_times(time: Floats) -> Floats | None:
     """Evenly spaced times [s], (n,), for recorded times [s], (n,), that were rounded, so that values repeat.
 
     None if time decreases, or if no even sampling rounds to these times.

@@ -170,7 +170,7 @@ def _read_block(headers: Sequence[list[str]], rows: Sequence[Line], vocabulary: 
     meanings = dict.fromkeys(columns, _Meaning())
     down, across = _Meaning(), _Meaning()
     for distance, cells in enumerate(reversed(headers)):
-        texts = _merged(cells) if distance else cells
+        texts = _fill_merged(cells) if distance else cells
         row = {column: _read_header(texts[column], vocabulary) for column in columns}
         levels = {meaning.stepped for meaning in row.values() if meaning.level}
         unclear = [column for column in columns if texts[column] and row[column] == _Meaning()]
@@ -196,7 +196,7 @@ def _read_block(headers: Sequence[list[str]], rows: Sequence[Line], vocabulary: 
     meanings = {n: meanings[n] | across | _Meaning(stepped=stepped) for n in columns}
     if stepped is None or len(columns) < 2 or not all(meaning.level for meaning in meanings.values()):
         return []
-    all_texts = list(map(_merged, headers))
+    all_texts = list(map(_fill_merged, headers))
     named = {(meaning, *(texts[column] for texts in all_texts)) for column, meaning in meanings.items()}
     if len(named) > len(set(meanings.values())):
         return []  # such as K axial and K radial, or two samples, at the same level
@@ -207,8 +207,8 @@ def _read_block(headers: Sequence[list[str]], rows: Sequence[Line], vocabulary: 
     ]
 
 
-def _merged(cells: Sequence[str]) -> list[str]:
-    """Cells of a row of headers, of which the empty ones repeat the cell on their left."""
+def _fill_merged(cells: Sequence[str]) -> list[str]:
+    """Fill each empty cell in a row of headers with the text of the nearest filled cell on its left."""
     merged: Iterator[str] = accumulate(cells, lambda before, cell: cell or before)
     return list(merged)
 
