@@ -5,7 +5,7 @@ from typing import Any
 
 
 def render_template(file: Path, **values: Any) -> str:
-    """Render a template of the package, whose name is that of the rendered file with the further extension `.jinja`.
+    """Render a Jinja template of the package to the content of a file; the template of page.html is page.html.jinja.
 
     Args:
         file: template, which may import others by their paths in the package; texts are escaped if it makes XML.

@@ -89,6 +89,9 @@ def fit_static(
         campaign: the campaign, or a campaign prepared by `prepare_tests`.
         dynamic: result whose springpot (m, alpha) is kept fixed; default the values of [fit], or else no springpot.
         loss: "soft_l1" or "linear"; default the campaign's.
+
+    Returns:
+        Fitted result with its covariance, and the result files.
     """
     data = prepare_tests(campaign, loss)
     result = procedures.fit_static(data, as_result(dynamic) if dynamic else None)
@@ -140,6 +143,9 @@ def prepare_tests(campaign: Campaign | PreparedCampaign, loss: Loss | None = Non
     Args:
         campaign: the campaign; a prepared campaign is returned unchanged.
         loss: "soft_l1" or "linear"; default the campaign's.
+
+    Returns:
+        The campaign with one data set per test: measured values, noise and weights.
     """
     if isinstance(campaign, PreparedCampaign):
         return campaign

@@ -30,6 +30,9 @@ def load_model(path: str | Path) -> Result:
     Args:
         path: model file such as model.json, or folder that contains model.json.
 
+    Returns:
+        The model, with the covariance of its parameters and the warnings of its fit.
+
     Raises:
         ModelError: the file is missing or contains no model.
     """

@@ -18,7 +18,7 @@ from bushfit.reading.layout import FileFormat
 from bushfit.reading.names import direction_of_file, named_direction
 from bushfit.reading.parts import OpenedFile, open_file
 from bushfit.reading.resonance import is_resonance
-from bushfit.reading.roles import PAIRS, of_motion, si_unit
+from bushfit.reading.roles import PAIRS, names_for_motion, si_unit
 from bushfit.reading.si_columns import columns_key
 from bushfit.reading.stiffness import refuse_ambiguous_damping
 from bushfit.reading.table import Table
@@ -62,7 +62,7 @@ def recognize_table(file: Path, test_options: Mapping[str, Any]) -> tuple[Table,
         try:
             table = open_table(content, names, test_options, motion)
         except BushfitError as error:
-            failed.append((of_motion(names, motion), error))
+            failed.append((names_for_motion(names, motion), error))
             continue
         opened.append((table, is_sweep))
         if missing_role(table, is_sweep=is_sweep) is None:

@@ -104,7 +104,7 @@ def view_bytes(
 
 
 def unpack_gzip(data: bytes, file: Path) -> bytes:
-    """Return the content of a file that gzip packed; the bytes of any other file are unchanged.
+    """Content of a file packed by gzip; the bytes of any other file are returned unchanged.
 
     Raises:
         MeasurementError: the packed file is damaged, or its content is too large.

@@ -13,7 +13,7 @@ from bushfit.reading.labelled import Rows, select_rows
 from bushfit.reading.layout import DELIMITERS, FileFormat, Layout, find_layout
 from bushfit.reading.parts import OpenedFile, open_file
 from bushfit.reading.reshape import reshape_table
-from bushfit.reading.roles import PAIRS, of_motion
+from bushfit.reading.roles import PAIRS, names_for_motion
 from bushfit.reading.source import RowSource, Sheet
 from bushfit.reading.table import Table
 from bushfit.reading.wide import unpivot
@@ -57,7 +57,7 @@ def find_table(
     opened = file if isinstance(file, OpenedFile) else open_file(file, file_format or FileFormat())
     columns, stated_units, header_line = dict(columns or {}), dict(stated_units or {}), opened.stated.header_line
     named = {role: text for role, text in columns.items() if not text.isdecimal()}
-    vocabulary = Vocabulary(of_motion(names, motion), named, stated_units)
+    vocabulary = Vocabulary(names_for_motion(names, motion), named, stated_units)
     may_be_wide = "amplitude" in names and header_line is None
     layouts = [
         (may_be_wide and unpivot(*as_written, opened.file, vocabulary)) or in_one

@@ -257,7 +257,7 @@ class Vocabulary:
                         continue  # "min" is no unit but of a time
                     is_unit = units.is_unit if role != "temperature" else units.kelvin_scale
                     column_unit = unit or (unit_below and parse_unit(unit_below)[0]) or unit_below
-                    fitting = role in self._stated_units or fits(word, role, column_unit)
+                    fitting = role in self._stated_units or can_have_role(word, role, column_unit)
                     if (certain or is_unit(unit or "")) and fitting:
                         return Heading(role, unit, implied, logarithm, extreme if is_extreme else None)
         return None
@@ -285,7 +285,7 @@ def _roles_by_name(names: tuple[tuple[str, ...], ...]) -> Mapping[str, list[str]
     return roles
 
 
-def fits(word: str, role: str, unit: str | None) -> bool:
+def can_have_role(word: str, role: str, unit: str | None) -> bool:
     """Check by its unit whether a column with an ambiguous name, such as "f", can have a role, such as "force".
 
     Args:
@@ -294,7 +294,7 @@ def fits(word: str, role: str, unit: str | None) -> bool:
         unit: unit of the column, "" if it has none; None if it is not known.
 
     Returns:
-        False if the unit excludes the role.
+        True unless the unit excludes the role.
     """
     if unit == "" and (role in ROLE_SETS["needing_units"] or word == "k"):
         return False

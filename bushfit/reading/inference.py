@@ -25,7 +25,7 @@ from bushfit.reading.headers import (
     split_unit,
 )
 from bushfit.reading.numerals import is_like_number
-from bushfit.reading.roles import CONVERSIONS, of_motion, si_unit
+from bushfit.reading.roles import CONVERSIONS, names_for_motion, si_unit
 from bushfit.reading.si_columns import column_of, first_numbers
 from bushfit.reading.table import Table
 from bushfit.reading.times import parse_clock
@@ -57,12 +57,12 @@ def add_by_unit(table: Table, roles: dict[str, Column]) -> tuple[list[Caveat], l
         roles: columns found so far, by role such as "force"; changed in place.
 
     Returns:
-        A warning on each added column, and the columns that are still unknown.
+        A warning on each added column; and the columns whose role is still unknown.
     """
     if len(roles) + len(table.headers) < 3:
         return [], []
     names, motion = table.names, table.motion
-    usual = Vocabulary(of_motion({**LOOP_COLUMNS, **SWEEP_COLUMNS}, motion), {}, {})
+    usual = Vocabulary(names_for_motion({**LOOP_COLUMNS, **SWEEP_COLUMNS}, motion), {}, {})
     free: dict[Column, set[str]] = {}
     for index, header in enumerate(table.headers):
         if not (header or table.layout.units[index]) or usual.heading(header) is not None:

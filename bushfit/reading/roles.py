@@ -28,7 +28,7 @@ CONVERSIONS = {
 _UNITS = {role: unit for unit, roles in WORDS["si_units"].items() for role in roles}
 
 
-def of_motion(names: Mapping[str, Sequence[str]], motion: Motion) -> dict[str, Sequence[str]]:
+def names_for_motion(names: Mapping[str, Sequence[str]], motion: Motion) -> dict[str, Sequence[str]]:
     """Adapt column names to a kind of motion: in a test of strain, for example, G' names a modulus, not a stiffness.
 
     Args:

@@ -28,7 +28,7 @@ from bushfit.reading.headers import (
 )
 from bushfit.reading.names import named_quantities
 from bushfit.reading.numerals import plainest_value
-from bushfit.reading.roles import OF_MOTION, of_motion, si_unit
+from bushfit.reading.roles import OF_MOTION, names_for_motion, si_unit
 
 if TYPE_CHECKING:
     from bushfit.reading.table import Table
@@ -170,8 +170,8 @@ def refuse_other_motion(table: Table, role: str, headers: Sequence[str] | None =
     hint = 'write [[specimens]] with a name and kind = "modulus" in the campaign, and specimen = "its name" here'
     if table.motion is STRAINING:
         hint = 'take specimen out of the campaign, or give it kind = "shear" with its area and thickness'
-    names = of_motion(table.names, other_motion)
-    differs = role in names and names[role] is not of_motion(table.names, table.motion)[role]
+    names = names_for_motion(table.names, other_motion)
+    differs = role in names and names[role] is not names_for_motion(table.names, table.motion)[role]
     words = Vocabulary({role: names[role]} if differs else {}, {})
     for header in headers or filter(words.heading, table.headers):
         label = role.replace("_", " ")

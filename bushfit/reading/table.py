@@ -34,7 +34,7 @@ from bushfit.reading.rejected import (
     refuse_other_columns,
     row_fault,
 )
-from bushfit.reading.roles import of_motion
+from bushfit.reading.roles import names_for_motion
 from bushfit.reading.source import LARGEST_VALUE, Channels, RowSource, Text, cells_of
 from bushfit.reading.times import parse_clock
 
@@ -150,7 +150,7 @@ class Table:
             Line number, cells, and the reason why the row is not data (see `row_fault`); None for a row of data.
         """
         level, is_other_table = dict[int, str | float](), False
-        vocabulary = Vocabulary(of_motion(self.names, self.motion))
+        vocabulary = Vocabulary(names_for_motion(self.names, self.motion))
         with error_location(self.file):
             for line in (block or self.source).lines(self.layout.lines_before_data):
                 if self.layout.numbered or not is_comment(line.content, self.layout.delimiter):
@@ -288,7 +288,7 @@ class Table:
         wanted = {**wanted, **subtracted}
         parts = [part for block in table.blocks() for part in table._read_block(block, wanted, left_out)]
         if left_out:
-            refuse_other_columns(table, left_out, Vocabulary(of_motion(self.names, self.motion)))
+            refuse_other_columns(table, left_out, Vocabulary(names_for_motion(self.names, self.motion)))
         values = {role: np.concatenate([np.empty(0), *(part.pop(role) for part in parts)]) for role in wanted}
         if mark_missing(table, wanted, values):
             return self.read(requested, fewest_rows=fewest_rows)

@@ -236,8 +236,8 @@ def _drift_and_harmonics(time: Floats, values: Floats, frequency: float, order: 
         order: largest number of harmonics.
 
     Returns:
-        Number of harmonics that the rows determine, at most `order`; coefficients, (p, 2); and their covariance for
-        values of unit variance, (p, p).
+        Number of harmonics that the rows determine, at most `order`; coefficients of mean, drift and harmonics for
+        displacement and force, (p, 2); and their covariance for values of unit variance, (p, p).
     """
     max_order = order = max(1, min(order, (time.size - _DRIFT_TERMS) // 4))
     size = _DRIFT_TERMS + 2 * max_order

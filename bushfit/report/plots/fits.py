@@ -135,7 +135,7 @@ def _draw_residuals(strips: Sequence[Axes], group: SweepGroup) -> None:
             strip.plot(points[group.x_header], points[header], look.marker, color=look.color, alpha=0.8, **style.DOT)
         style.label_axes(strip, group.x_header, f"{part} residual\n/ noise", x)
         if group.axis == "amplitude" and x.max() > 3.0 * x.min():
-            style.logarithmic(strip, x)
+            style.make_logarithmic(strip, x)
         style.noise_band(strip)
         style.mark_outliers(strip, outliers[group.x_header].to_numpy(), outliers[header].to_numpy())
 

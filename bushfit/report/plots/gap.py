@@ -194,7 +194,7 @@ def draw_map(axes: Axes, group: SweepGroup, rows: Sequence[Curve], header: str, 
     axes.hlines(np.arange(1, len(rows)) - 0.5, x_start, x_end, color="white", lw=1.5)
     axes.set(ylim=(-0.5, len(rows) - 0.5))
     if logarithmic:
-        style.logarithmic(axes, x_values)
+        style.make_logarithmic(axes, x_values)
     axes.set_xlim(x_start, x_end)
     axes.grid(visible=False)
     axes.spines[:].set(visible=True, color=style.GREY)

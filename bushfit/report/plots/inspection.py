@@ -241,7 +241,7 @@ def resonance_figure(resonance: Resonance, title: str) -> style.Chart:
         axes.plot(resonance.frequency, values, "o", color=color, **style.DOT)
         style.label_axes(axes, x_label, label, resonance.test.frequency)
         if half is None:
-            style.logarithmic(axes, values, "y")
+            style.make_logarithmic(axes, values, "y")
         else:
             limits = axes.get_ylim()
             axes.vlines(resonance.frequency, values - half, values + half, color=color, lw=0.7, alpha=0.6)

@@ -51,7 +51,7 @@ def master_curve_figure(model: Model, shifted_sweeps: Sequence[ShiftedSweep], ti
         frequency = np.geomspace(reach.min(), reach.max(), _FINE)
         pair.plot(frequency, model.stiffness(place, frequency, level), color=style.INK, lw=1.1, zorder=3)
         for axes in panels:
-            style.logarithmic(axes, reach)
+            style.make_logarithmic(axes, reach)
         style.color_bar(panels[-1], [f"{degree:g} °C" for degree in degrees], "temperature")
     return figure.explain(
         f"Line: model at 23 °C, {', '.join(levels)}. Points: measured, shifted to 23 °C by the model."

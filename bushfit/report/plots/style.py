@@ -201,7 +201,7 @@ def label_axes(axes: Axes, x_label: str, y_label: str, x: Array | None = None) -
         axes.locator_params("y", nbins=_MOST_TICKS)
     axes.spines[:].set_in_layout(False)  # ticks and labels determine the layout
     if x is not None and x.max() > _LOG_RATIO * x.min():
-        logarithmic(axes, x)
+        make_logarithmic(axes, x)
 
 
 def label_left(axes: Axes, label: str, **options: Any) -> None:
@@ -217,7 +217,7 @@ def label_left(axes: Axes, label: str, **options: Any) -> None:
     axes.set_ylabel("\n".join(lines), **options)
 
 
-def logarithmic(axes: Axes, values: Array, axis_name: Literal["x", "y"] = "x") -> None:
+def make_logarithmic(axes: Axes, values: Array, axis_name: Literal["x", "y"] = "x") -> None:
     """Make an axis logarithmic, with ticks as plain numbers such as 0.1, 1 and 10, and as powers from 10,000.
 
     Args:
