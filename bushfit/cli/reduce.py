@@ -114,7 +114,7 @@ def _resonance_table(file: Path, test_options: Mapping[str, Any], shaker: Mappin
 
     Args:
         file: test file.
-        test_options: metadata from the command line.
+        test_options: what the user states on the test, by campaign key such as "direction".
         shaker: options of a resonance test by key: masses [kg], base acceleration [m/s^2], specimen; None if not given.
     """
     from bushfit.inspection.recognition import open_table
@@ -140,7 +140,7 @@ def _reduce_resonance(
     Args:
         files: the test file; more than one is an error.
         table: table of the file.
-        test_options: metadata from the command line.
+        test_options: what the user states on the test, by campaign key such as "direction".
         shaker: options of a resonance test by key: masses [kg], base acceleration [m/s^2], specimen; None if not given.
         levels: text of the option --levels, which is an error here; None if it is not given.
 

@@ -51,7 +51,7 @@ class TestSource:
         file: test file.
         sheet: name of a sheet, if the workbook has several; None for the whole file.
         is_named: True if the user named the file itself, False if it was found in a folder.
-        test_options: keys of [[loops]] and [[sweeps]] that the user states for the test.
+        test_options: what the user states on the test, by key of [[loops]] and [[sweeps]].
         of_book: labels (quantities stated in text) in the sheets of the workbook that contain no test.
         differs_in_force: True if the force in its name is the preload, because names of other tests state other forces.
     """
@@ -147,7 +147,7 @@ def split_sheets(file: TestSource, test_options: Mapping[str, Any], left_out: li
 
     Args:
         file: test file; a file with one sheet that the user named is accepted without a check of its columns.
-        test_options: options that apply to all tests; with the key `sheet`, the file is one test.
+        test_options: what the user states on all tests, by campaign key; with the key "sheet", the file is one test.
         left_out: list to which a warning on each sheet or file without a test is added.
 
     Returns:
@@ -241,7 +241,7 @@ def distribute_options(sources: Sequence[TestSource], test_options: Mapping[str,
 
     Args:
         sources: the tests.
-        test_options: options that the user states for all tests.
+        test_options: what the user states on all tests, by campaign key such as "direction".
 
     Returns:
         The tests with their options.
@@ -311,7 +311,7 @@ def needs_option(file: Path, key: str, role: str, test_options: Mapping[str, Any
         file: test file.
         key: "columns" or "units".
         role: role of the column, such as "force".
-        test_options: options of the test.
+        test_options: what the user states on the test, by campaign key such as "direction".
 
     Returns:
         For "columns", True if the file has the stated column; for "units", True if the header of the column states no

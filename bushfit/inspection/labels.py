@@ -43,7 +43,8 @@ def labels_of_file(file: Path, sheet: str, test_options: Mapping[str, Any]) -> L
     Args:
         file: test file.
         sheet: name of the sheet, or "".
-        test_options: options of the test; `amplitude` states whether amplitudes are zero-to-peak or peak-to-peak.
+        test_options: what the user states on the test, by campaign key; the value of "amplitude" is the convention
+            of amplitudes, "zero-to-peak" or "peak-to-peak".
 
     Returns:
         The quantities and conditions, as `Labels`.
@@ -66,7 +67,7 @@ def keys_from_labels(
     Args:
         table: table of the test.
         place: direction or specimen; it determines the unit of an amplitude.
-        test_options: options of the test.
+        test_options: what the user states on the test, by campaign key such as "direction".
         by_name: labels in the names of file and sheet.
         of_book: labels in the other sheets of the workbook.
         is_sweep: True for a sweep, whose frequency and amplitude have to be known.

@@ -100,7 +100,7 @@ def read_history(file: Path, test_options: Mapping[str, Any]) -> tuple[Loop, Dir
 
     Args:
         file: test file.
-        test_options: keys of [[loops]], as TOML gives them.
+        test_options: what the user states on the test, by key of [[loops]], with values as TOML gives them.
 
     Returns:
         The history in SI, and its direction; None if neither file nor options state it.
@@ -128,7 +128,7 @@ def campaign_entry(
     Args:
         table: table of the test.
         place: direction or specimen; None if unknown.
-        test_options: options of the test.
+        test_options: what the user states on the test, by campaign key such as "direction".
         is_sweep: True for a sweep, False for a loop.
 
     Returns:

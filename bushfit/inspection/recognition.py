@@ -140,7 +140,7 @@ def tested_body(file: Path, table: Table, test_options: Mapping[str, Any]) -> Pl
     Args:
         file: test file.
         table: table of the file.
-        test_options: options of the test.
+        test_options: what the user states on the test, by campaign key such as "direction".
 
     Returns:
         Direction or specimen; None if neither options nor file state it.
@@ -165,7 +165,7 @@ def test_direction(file: Path, table: Table, test_options: Mapping[str, Any]) ->
     Args:
         file: test file.
         table: table of the file.
-        test_options: options of the test.
+        test_options: what the user states on the test, by campaign key such as "direction".
 
     Returns:
         The direction; None if neither option nor file states it.
@@ -216,7 +216,7 @@ def open_table(
     Args:
         file: test file, or its opened content.
         names: known headers of the columns of this kind of test, by role such as "force".
-        test_options: options of the test; options for columns of other tests are ignored.
+        test_options: what the user states on the test, by campaign key; columns of other tests are ignored.
         motion: kind of motion that the columns describe.
 
     Returns:

@@ -134,7 +134,7 @@ def label_columns(
     Args:
         above: lines above each block. The last line can be its title, which is used if nothing else distinguishes the
             blocks: "Run 2" counts the repeats, and "before" or "S1" names a part.
-        vocabulary: known column names.
+        vocabulary: known column names, by which a header has a role such as "force".
         roles: roles for which the blocks already have a column.
         are_sides: True for blocks side by side, which are not repeats if their titles differ in a number alone.
 
@@ -168,7 +168,7 @@ def is_of_block(line: Line, columns: Sequence[str], vocabulary: Vocabulary) -> b
     Args:
         line: line above the first block.
         columns: headers of the columns that are made from the lines above the blocks.
-        vocabulary: known column names.
+        vocabulary: known column names, by which a header has a role such as "force".
 
     Returns:
         True or False; a line for all blocks is False.
@@ -183,7 +183,7 @@ def stated_above(lines: Sequence[Line], vocabulary: Vocabulary) -> dict[str, str
 
     Args:
         lines: lines above the block, of which the last is its title.
-        vocabulary: known column names.
+        vocabulary: known column names, by which a header has a role such as "force".
 
     Returns:
         Number or text by header of the column that would contain it, such as "amplitude [mm]".

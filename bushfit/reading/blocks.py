@@ -107,7 +107,7 @@ def combine_blocks(source: RowSource, layout: Layout, vocabulary: Vocabulary) ->
     Args:
         source: lines or rows of the file.
         layout: location and headers of the first block.
-        vocabulary: known column names.
+        vocabulary: known column names, by which a header has a role such as "force".
 
     Returns:
         Source and layout of the table, with an added column "block" and a column for each quantity, such as the

@@ -26,7 +26,7 @@ def listed_names(
     Args:
         lines: lines above the table.
         rows: cells of its first row, for each possible delimiter.
-        vocabulary: known column names.
+        vocabulary: known column names, by which a header has a role such as "force".
 
     Returns:
         Index of the last line of the list, index of the delimiter that gives as many cells as there are names, and the

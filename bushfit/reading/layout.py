@@ -127,7 +127,7 @@ def find_layout(
 
     Args:
         lines: non-empty lines at the start of the file.
-        vocabulary: known column names.
+        vocabulary: known column names, by which a header has a role such as "force".
         delimiter: character between cells; "" for a sheet; None to detect it.
         header_line: line number of the header, if the user states it.
 
@@ -173,7 +173,7 @@ def _candidates(
         lines: non-empty lines at the start of the file.
         before: indices of lines that may be the header.
         delimiters: possible characters between cells.
-        vocabulary: known column names.
+        vocabulary: known column names, by which a header has a role such as "force".
 
     Yields:
         Rank for the choice among headers, index in `lines`, delimiter and header cells.
@@ -277,7 +277,7 @@ def _layout(
 
     Args:
         lines: non-empty lines at the start of the file.
-        vocabulary: known column names.
+        vocabulary: known column names, by which a header has a role such as "force".
         index: index of the header in `lines`.
         delimiter: character between cells.
         headers: header cells.
@@ -339,7 +339,7 @@ def _with_units(layout: Layout, lines: Sequence[Line], index: int, vocabulary: V
         layout: layout without units.
         lines: non-empty lines at the start of the file.
         index: index of the header in `lines`.
-        vocabulary: known column names.
+        vocabulary: known column names, by which a header has a role such as "force".
     """
     headers, empty, above = layout.headers, layout.units, lines[:index]
     below = list(_below(lines, index, layout.delimiter))

@@ -231,7 +231,7 @@ def refuse_other_columns(table: Table, left_out: Iterable[FaultyRow], vocabulary
     Args:
         table: table with its columns by role.
         left_out: rows of the table that are not data.
-        vocabulary: known column names.
+        vocabulary: known column names, by which a header has a role such as "force".
 
     Raises:
         MeasurementError: a header repeats the columns in another order.

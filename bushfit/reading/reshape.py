@@ -40,7 +40,7 @@ def reshape_table(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> 
     Args:
         source: lines or rows of the file.
         layout: layout of the file if it is read as a table with a column for each quantity.
-        vocabulary: known column names.
+        vocabulary: known column names, by which a header has a role such as "force".
 
     Returns:
         Sheet with a column for each quantity, below the lines above the table; None if the table has one already.
@@ -148,7 +148,7 @@ def _exchange_rows(source: RowSource, layout: Layout, vocabulary: Vocabulary) ->
     Args:
         source: lines or rows of the file.
         layout: layout of the file if it is read as a table with a column for each quantity.
-        vocabulary: known column names.
+        vocabulary: known column names, by which a header has a role such as "force".
 
     Returns:
         Sheet with the exchanged tables, below the lines above each; None if there is no such table.

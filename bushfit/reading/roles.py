@@ -80,7 +80,7 @@ def stated_once(headers: Sequence[str], rows: Iterable[Sequence[str]], vocabular
         headers: header cells of the table.
         rows: cells of its first rows, as texts; rows without a stiffness or loss, such as those of waveforms, are
             ignored.
-        vocabulary: known column names.
+        vocabulary: known column names, by which a header has a role such as "force".
 
     Returns:
         Indices of the columns.

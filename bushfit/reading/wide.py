@@ -99,7 +99,7 @@ def unpivot(source: RowSource, layout: Layout, file: Path, vocabulary: Vocabular
         source: lines or rows of the file.
         layout: layout of the file if it is read as a long table.
         file: path, for errors.
-        vocabulary: known column names.
+        vocabulary: known column names, by which a header has a role such as "force".
 
     Returns:
         Source and layout of the long table; None if the file has no wide table.
@@ -164,7 +164,7 @@ def _read_block(headers: Sequence[list[str]], rows: Sequence[Line], vocabulary: 
     Args:
         headers: cells of the header rows.
         rows: rows of numbers.
-        vocabulary: known column names.
+        vocabulary: known column names, by which a header has a role such as "force".
     """
     columns = [n for n in range(1, len(headers[0])) if any(row.content[n] != "" for row in rows)]
     meanings = dict.fromkeys(columns, _Meaning())
@@ -278,7 +278,7 @@ def _long_table(
         columns: columns of all blocks.
         source: lines or rows of the file.
         file: path, for errors.
-        vocabulary: known column names.
+        vocabulary: known column names, by which a header has a role such as "force".
 
     Raises:
         MeasurementError: a block does not state its quantity, blocks differ in their frequencies or amplitudes, or a
