@@ -104,7 +104,7 @@ def view_bytes(
 
 
 def unpack_gzip(data: bytes, file: Path) -> bytes:
-    """Content of a file packed by gzip; the bytes of any other file are returned unchanged.
+    """Return the content of a file packed by gzip; the bytes of any other file are unchanged.
 
     Raises:
         MeasurementError: the packed file is damaged, or its content is too large.

@@ -99,9 +99,11 @@ def runs_of(
 
 
 def nominal_amplitudes(amplitude: Floats) -> Floats:
-    """Nominal level of each reached amplitude, (n,): the median of a narrow group of amplitudes, in the same unit.
+    """Replace each reached amplitude, (n,), by its nominal level: the median of a narrow group of amplitudes.
 
-    The amplitudes are returned unchanged if wide gaps do not separate them into narrow groups of several points.
+    Returns:
+        Levels in the unit of the amplitudes, (n,); the amplitudes themselves if wide gaps do not separate them into
+        narrow groups of several points.
     """
     distinct, index = np.unique(amplitude, return_inverse=True)
     logs = np.log(distinct)

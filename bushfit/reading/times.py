@@ -86,9 +86,10 @@ def are_day_numbers(values: Floats) -> bool:
 
 
 def spread_rounded_times(time: Floats) -> Floats | None:
-    """Evenly spaced times [s], (n,), for recorded times [s], (n,), that were rounded, so that values repeat.
+    """Replace recorded times [s], (n,), that were rounded, so that values repeat, by evenly spaced times.
 
-    None if time decreases, or if no even sampling rounds to these times.
+    Returns:
+        Times [s], (n,); None if time decreases, or if no even sampling rounds to these times.
 
     Notes:
         With q the smallest step between different times, an even clock t0 + i dt is rounded to within q. The line
