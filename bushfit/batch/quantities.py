@@ -185,7 +185,7 @@ def measured_curve(sweeps: Iterable[Sweep]) -> dict[str, float]:
         |K| [SI] by operating point, at most twelve points.
     """
     for sweep in sweeps:
-        constant, step = (np.array([float(f"{x:.3g}") for x in values]) for values in (sweep.held_value, sweep.step))
+        constant, step = (np.array([float(f"{x:.3g}") for x in values]) for values in (sweep.run_level, sweep.step))
         levels = [level for level in np.unique(constant) if np.unique(step[constant == level]).size >= 3]
         if not levels or not sweep.stepped:
             continue

@@ -44,7 +44,7 @@ def copied_points(sweeps: Sequence[Sweep]) -> dict[tuple[int, int], list[int]]:
         numbers = np.stack(columns, axis=1)  # rounded, so that equal data have equal numbers
         scale = 10.0 ** (_DIGITS - 1 - np.floor(np.log10(np.maximum(np.abs(numbers), 1e-300))))
         points.append([(sweep.direction, *point) for point in (np.round(numbers * scale) / scale).tolist()])
-        for row, level in enumerate(zip(sweep.repeat.tolist(), sweep.held_value.tolist(), strict=True)):
+        for row, level in enumerate(zip(sweep.repeat.tolist(), sweep.run_level.tolist(), strict=True)):
             run = (index, level if sweep.stepped else None)
             runs.setdefault(run, []).append(row)
             runs_at[points[index][row]].add(run)

@@ -133,7 +133,7 @@ def _hold_out_inside(before: FitResult, closest: FitResult, correction: Unnamed)
     chosen: dict[str, dict[MeasuredTest, Array]] = {}
     for sweep in split_by_kind(before.data_sets)[1]:
         rank = np.unique(sweep.step, return_inverse=True)[1]
-        levels, level = np.unique(sweep.held_value, return_inverse=True)
+        levels, level = np.unique(sweep.run_level, return_inverse=True)
         last_repeat = (sweep.repeat == sweep.repeat.max()) & (np.ptp(sweep.repeat) > 0)
         masks = {
             f"every third {sweep.test.stepped or 'point'}": (rank % 3 == 1) & (rank < rank.max()),

@@ -131,12 +131,12 @@ def _shorten_sweep(data_set: MeasuredSweep) -> _ShortSweep | None:
         The shortened sweep; None if the sweep is short enough.
     """
     sweep, rows, sentence = data_set.test, data_set.order[data_set.weights > 0.0], ""
-    levels = np.unique(sweep.held_value[rows])
+    levels = np.unique(sweep.run_level[rows])
     if levels.size > _MOST_LEVELS:
         some = levels[np.linspace(0, levels.size - 1, _MOST_LEVELS).round().astype(int)]
-        rows = rows[np.isin(sweep.held_value[rows], some)]
+        rows = rows[np.isin(sweep.run_level[rows], some)]
         sentence = f"the diagnosis uses {some.size} of {levels.size} runs at one level or frequency, evenly spread"
-    level_of_row, repeat = sweep.held_value[rows], sweep.repeat[rows]
+    level_of_row, repeat = sweep.run_level[rows], sweep.repeat[rows]
     step = sweep.step[rows] if sweep.stepped else rows  # if neither is constant, in the order of measurement
     band, long = np.arange(rows.size), list[float]()  # one band for each point
     for level in np.unique(level_of_row).tolist():
@@ -152,7 +152,7 @@ def _shorten_sweep(data_set: MeasuredSweep) -> _ShortSweep | None:
     if means.frequency.size < rows.size:
         counted = f"{rows.size} points are averaged to {means.frequency.size} narrow bands for the diagnosis"
         sentence = "; ".join(filter(None, (sentence, counted)))
-    ratios = {(sweep.name, level): float(np.mean(1.0 / counts[means.held_value == level])) for level in long}
+    ratios = {(sweep.name, level): float(np.mean(1.0 / counts[means.run_level == level])) for level in long}
     return _ShortSweep(means, conditions, ratios, sentence)
 
 

@@ -260,14 +260,14 @@ def _levels(fit: FitResult, sweeps: Sequence[MeasuredSweep]) -> Iterator[FaultyP
     preloads = {sweep: abs(sweep.test.preload.value) if sweep.test.preload else 0.0 for sweep in sweeps}
     for sweep in sweeps:
         members = [member for member in sweeps if member.direction == sweep.direction]
-        levels, preload = np.concatenate([np.unique(member.held_value) for member in members]), preloads[sweep]
-        for level in np.unique(sweep.held_value):
-            mask = sweep.held_value == level
+        levels, preload = np.concatenate([np.unique(member.run_level) for member in members]), preloads[sweep]
+        for level in np.unique(sweep.run_level):
+            mask = sweep.run_level == level
             label = add_preload(_level_label(sweep, int(np.argmax(mask))), sweep.test.preload, sweep.direction)
             if levels.size > 1:  # in this file or in others
                 part = _common_fault(fit, "level", label, [sweep], [mask])
                 rivals = [member for member in members if member is not sweep]
-                distances = [np.abs(np.log(rival.held_value / level)).min() for rival in rivals]
+                distances = [np.abs(np.log(rival.run_level / level)).min() for rival in rivals]
                 loads = [preloads[r] for r, d in zip(rivals, distances, strict=True) if d < np.log(_SAME)]
                 is_largest = level == levels.max() and all(preload > load for load in loads)
                 is_smallest = level == levels.min() and all(preload < load for load in loads)

@@ -245,7 +245,7 @@ def hold_out_parts(data_sets: Sequence[MeasuredTest]) -> list[HoldOutPart]:
     loops, sweeps = split_by_kind(data_sets)
     for stepped, (level_name, top) in _NAMES.items():
         members = [sweep for sweep in sweeps if sweep.test.stepped == stepped]
-        ranks = {sweep: np.unique(sweep.held_value, return_inverse=True)[1] for sweep in members}
+        ranks = {sweep: np.unique(sweep.run_level, return_inverse=True)[1] for sweep in members}
         for rank in range(max((int(r.max()) + 1 for r in ranks.values()), default=0)):
             chosen[f"{level_name} {rank + 1}"] = {sweep: r == rank for sweep, r in ranks.items()}
         if members and top:

@@ -88,13 +88,13 @@ def level_misfits(sweep: MeasuredSweep, model: Model) -> Iterator[LevelMisfit]:
         Misfit over the stepped quantity, averaged over the repeats of the level.
     """
     ratio = sweep.measured / sweep.response(model) - 1.0
-    for held_value in np.unique(sweep.held_value):
-        mask = sweep.held_value == held_value
+    for run_level in np.unique(sweep.run_level):
+        mask = sweep.run_level == run_level
         _, first, index, counts = np.unique(
             sweep.step[mask], return_index=True, return_inverse=True, return_counts=True
         )
         mean = (np.bincount(index, ratio[mask].real) + 1j * np.bincount(index, ratio[mask].imag)) / counts
-        variance = np.square(sweep.noise.random[sweep.name, float(held_value)]) + np.square(sweep.noise.shared)
+        variance = np.square(sweep.noise.random[sweep.name, float(run_level)]) + np.square(sweep.noise.shared)
         noise = np.sqrt(variance / np.median(counts) + np.square(sweep.noise.level))
         yield LevelMisfit(sweep, np.flatnonzero(mask)[first], mean, noise)
 

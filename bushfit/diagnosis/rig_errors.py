@@ -225,9 +225,9 @@ def error_blocks(fit: FitResult, rig: RigSettings) -> Iterator[Block]:
         first, count = fit.residual_rows[sweep].start, sweep.frequency.size
         runs = np.split(np.arange(count), sweep.block_starts[1:])
         units = sweep.whiten(np.full(count, 1.0 + 1.0j)).reshape(2, count)
-        for level in np.unique(sweep.held_value):
-            line = np.flatnonzero(sweep.held_value == level)
-            line_runs = [run - line[0] for run in runs if sweep.held_value[run[0]] == level]
+        for level in np.unique(sweep.run_level):
+            line = np.flatnonzero(sweep.run_level == level)
+            line_runs = [run - line[0] for run in runs if sweep.run_level[run[0]] == level]
             columns, kinds = _shared_errors(line.size, line_runs)
             for part, unit_class in enumerate(classes):
                 yield Block(first + part * count + line, unit_class * columns * units[part, line], kinds, scatters=True)

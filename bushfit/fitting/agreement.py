@@ -293,5 +293,5 @@ def _runs(test: MeasuredTest) -> Iterator[tuple[dict[str, Any], Array]]:
         return
     quantity = "amplitude" if test.test.stepped == "frequency" else "frequency"
     unit = test.direction.motion.displacement_unit if quantity == "amplitude" else "Hz"
-    for value in np.unique(test.held_value):
-        yield {"held": quantity, "value": float(value), "unit": unit}, test.held_value == value
+    for value in np.unique(test.run_level):
+        yield {"held": quantity, "value": float(value), "unit": unit}, test.run_level == value

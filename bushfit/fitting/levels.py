@@ -116,5 +116,5 @@ def level_error_columns(sweep: MeasuredSweep) -> Array:
     Returns:
         Derivatives, (2 levels, n): gain [1] and phase [rad] of the first level, then of the next.
     """
-    masks = (sweep.held_value == held_value for held_value in np.unique(sweep.held_value))
+    masks = (sweep.run_level == run_level for run_level in np.unique(sweep.run_level))
     return np.array([column for mask in masks for column in sweep.shared_error_columns(mask)])

@@ -48,7 +48,7 @@ class MeasuredSweep(MeasuredBase):
         order: index of the row of each of the n used points in the sweep, (n,).
         frequency, amplitude, measured: frequency [Hz], zero-to-peak amplitude [m or rad] and complex stiffness [N/m or
             N m/rad] of each point, (n,) each.
-        held_value: value that is constant in the run of each point, (n,): amplitude [m or rad], frequency [Hz] or
+        run_level: quantity that is constant in the run of each point, (n,): amplitude [m or rad], frequency [Hz] or
             number of the run.
         step: value that changes from point to point of the run, (n,): frequency [Hz] or amplitude [m or rad].
         repeat: number of the repeat of each point, (n,).
@@ -68,7 +68,7 @@ class MeasuredSweep(MeasuredBase):
     order: Array = field(init=False, repr=False)
     frequency: Array = field(init=False, repr=False)
     amplitude: Array = field(init=False, repr=False)
-    held_value: Array = field(init=False, repr=False)
+    run_level: Array = field(init=False, repr=False)
     step: Array = field(init=False, repr=False)
     repeat: Array = field(init=False, repr=False)
     measured: Array = field(init=False, repr=False)
@@ -77,9 +77,9 @@ class MeasuredSweep(MeasuredBase):
 
     def __post_init__(self) -> None:
         sweep = self.test
-        order = np.lexsort((sweep.step, sweep.repeat, sweep.held_value)) if self.part is None else self.part
-        arrays = sweep.frequency, sweep.amplitude, sweep.held_value, sweep.step, sweep.repeat, sweep.stiffness
-        names = "frequency", "amplitude", "held_value", "step", "repeat", "measured"
+        order = np.lexsort((sweep.step, sweep.repeat, sweep.run_level)) if self.part is None else self.part
+        arrays = sweep.frequency, sweep.amplitude, sweep.run_level, sweep.step, sweep.repeat, sweep.stiffness
+        names = "frequency", "amplitude", "run_level", "step", "repeat", "measured"
         for name, array in zip(names, arrays, strict=True):
             object.__setattr__(self, name, array[order])
         object.__setattr__(self, "order", order)
@@ -160,7 +160,7 @@ class MeasuredSweep(MeasuredBase):
     @cached_property
     def block_starts(self) -> Array:
         """Index of the first point of each run (one recording at a constant amplitude or frequency), (runs,)."""
-        label = np.stack((self.held_value, self.repeat.astype(float)))
+        label = np.stack((self.run_level, self.repeat.astype(float)))
         return np.concatenate(([0], 1 + np.flatnonzero(np.any(np.diff(label), axis=0))))
 
     @cached_property
@@ -242,7 +242,7 @@ class MeasuredSweep(MeasuredBase):
         """Standard deviation of the random error of each point in relative gain and in phase [rad], (2, n)."""
         if self.test.relative_error is not None and self.test.noise is None:
             return np.maximum(np.tile(self.test.relative_error[self.order], (2, 1)), FLOOR)
-        return self.noise.random_noise(self.name, self.held_value, self.step)
+        return self.noise.random_noise(self.name, self.run_level, self.step)
 
     @cached_property
     def per_noise(self) -> Array:
@@ -263,7 +263,7 @@ class MeasuredSweep(MeasuredBase):
 
     def _level_errors(self, per_noise: Array) -> SharedErrors:
         """Gain and phase error of each level, as correlated errors of the deviations multiplied by `per_noise`."""
-        return SharedErrors.of_groups(np.unique(self.held_value, return_inverse=True)[1], per_noise, self.noise.level)
+        return SharedErrors.of_groups(np.unique(self.run_level, return_inverse=True)[1], per_noise, self.noise.level)
 
     @cached_property
     def level_errors(self) -> SharedErrors:

@@ -78,17 +78,17 @@ class SweepNoise:
     level_freedom: int = 0
     excess_warnings: Mapping[str, Caveat] = field(default_factory=dict)
 
-    def random_noise(self, name: str, held_values: Array, step: Array) -> Array:
+    def random_noise(self, name: str, run_levels: Array, step: Array) -> Array:
         """Standard deviation of the random error of n points of a sweep in relative gain and in phase [rad], (2, n).
 
         Args:
             name: name of the sweep.
-            held_values: amplitude [m or rad] or frequency [Hz] that is constant in the run of each point, (n,).
+            run_levels: amplitude [m or rad] or frequency [Hz] that is constant in the run of each point, (n,).
             step: frequency [Hz] or amplitude [m or rad] that changes along the run, (n,).
         """
-        of_levels = {level: self.random[name, float(level)] for level in np.unique(held_values)}
+        of_levels = {level: self.random[name, float(level)] for level in np.unique(run_levels)}
         exponent, reference = self.slopes.get(name, (0.0, 1.0))
-        return np.array([of_levels[level] for level in held_values]).T * (step / reference) ** exponent
+        return np.array([of_levels[level] for level in run_levels]).T * (step / reference) ** exponent
 
     def describe(self) -> str:
         """Describe size and origin of the sweeps' noise in one line for reports."""
@@ -122,9 +122,9 @@ def sweep_noise(sweeps: Sequence[Sweep], rig: RigSettings = UNSTATED) -> SweepNo
     def of_levels(without: Collection[float]) -> dict[LevelKey, LevelNoise]:
         """Noise of every run at one constant value, by sweep and value, without the points at the given steps."""
         return {
-            (sweep.name, float(held_value)): level_noise(sweep, log_stiffness, held_value, without)
+            (sweep.name, float(run_level)): level_noise(sweep, log_stiffness, run_level, without)
             for sweep, log_stiffness in at_levels
-            for held_value in np.unique(sweep.held_value)
+            for run_level in np.unique(sweep.run_level)
         }
 
     levels = of_levels(())

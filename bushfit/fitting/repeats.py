@@ -70,19 +70,19 @@ class LevelNoise:
         return np.asarray(np.square(self.errors).sum(axis=0) / max(self.freedom, 1))
 
 
-def level_noise(sweep: Sweep, log_stiffness: Array, held_value: float, disturbed: Collection[float] = ()) -> LevelNoise:
+def level_noise(sweep: Sweep, log_stiffness: Array, run_level: float, disturbed: Collection[float] = ()) -> LevelNoise:
     """Estimate the noise of a level of a sweep (its runs at one constant value), from repeats or about a smooth curve.
 
     Args:
         sweep: measured sweep.
         log_stiffness: ln K of the sweep's points, complex (n,).
-        held_value: value held constant along the level: amplitude [m or rad], frequency [Hz] or number of the run.
+        run_level: constant quantity of the level: amplitude [m or rad], frequency [Hz] or number of the run.
         disturbed: frequencies or amplitudes to leave out, see `disturbed_steps`.
 
     Returns:
         Noise of the level.
     """
-    chosen = (sweep.held_value == held_value) & ~np.isin(sweep.step, [*disturbed])
+    chosen = (sweep.run_level == run_level) & ~np.isin(sweep.step, [*disturbed])
     steps, column = np.unique(sweep.step[chosen], return_inverse=True)
     numbers, row = np.unique(sweep.repeat[chosen], return_inverse=True)
     table = np.full((numbers.size, steps.size), np.nan + 0j)

@@ -104,7 +104,7 @@ def copied_rows(sweep: Sweep, noise: SweepNoise, points: pd.DataFrame) -> Iterat
     magnitude = np.abs(sweep.stiffness)
     digits = max(len(f"{value:.8e}".partition("e")[0].replace(".", "").rstrip("0")) for value in magnitude)
     finest = 10.0 ** (np.floor(np.log10(magnitude[first])) + 1 - digits)
-    scatter = np.array([noise.random[sweep.name, float(value)][0] for value in sweep.held_value[first]])
+    scatter = np.array([noise.random[sweep.name, float(value)][0] for value in sweep.run_level[first]])
     same_digit = np.minimum(finest / (scatter * magnitude[first]), 1.0)  # two draws fall on the same last digit
     expected = np.sum(repeats * (repeats - 1) / 2.0 * same_digit * np.maximum(same_digit, _SAME_PHASE_P))
     if (count := int(copied.sum())) and pdtrc(count - 1, expected) < _CHANCE:
@@ -184,7 +184,7 @@ def distance_from_curve(sweep: Sweep, points: pd.DataFrame) -> Array:
         two distances is returned.
     """
     distance = np.zeros((len(points), 2))
-    for rows in group_rows(sweep.repeat.astype(float), sweep.held_value) if sweep.stepped else ():
+    for rows in group_rows(sweep.repeat.astype(float), sweep.run_level) if sweep.stepped else ():
         steps, rank = np.unique(sweep.step[rows], return_inverse=True)
         if steps.size < _FEWEST_POINTS:
             continue
@@ -218,7 +218,7 @@ def outlying_points(
     """
     filled = from_repeats.fillna(0.0)  # what a block has in common is no outlier
     distance = np.array(filled - filled.groupby([points["repeat"], points["amplitude"]]).transform("median"))
-    random = np.array([noise.random[sweep.name, float(value)] for value in sweep.held_value])
+    random = np.array([noise.random[sweep.name, float(value)] for value in sweep.run_level])
     far = np.any((np.abs(distance) > _FAR * random) & (np.abs(distance) > _SMALLEST_OUTLIER), axis=1)
     curve = distance_from_curve(sweep, points)
     alone = from_repeats["gain"].isna().to_numpy() & (np.linalg.norm(curve, axis=1) > _SMALLEST_FROM_CURVE)

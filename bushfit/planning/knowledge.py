@@ -232,6 +232,6 @@ def _campaign_runs(data: PreparedCampaign) -> Iterator[Test]:
         stepped = sweep.test.stepped
         for block in np.split(np.arange(sweep.frequency.size), sweep.block_starts[1:]) if stepped else ():
             steps = tuple(sweep.step[block].tolist())
-            level = (float(sweep.held_value[block[0]]),)
+            level = (float(sweep.run_level[block[0]]),)
             amplitudes, frequencies = (level, steps) if stepped == "frequency" else (steps, level)
             yield SimulatedSweep(sweep.direction, amplitudes, frequencies, stepped or "frequency")

@@ -168,8 +168,8 @@ class Sweep:
         return self.amplitude if self.reached is None else self.reached
 
     @property
-    def held_value(self) -> Floats:
-        """Constant quantity in the run of each point, (n,): amplitude [m or rad], frequency [Hz] or repeat number."""
+    def run_level(self) -> Floats:
+        """Constant level of the run of each point, (n,): amplitude [m or rad], frequency [Hz] or repeat number."""
         if self.stepped is None:
             return self.repeat.astype(float)
         return self.amplitude if self.stepped == "frequency" else self.frequency

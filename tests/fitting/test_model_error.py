@@ -225,15 +225,15 @@ def test_the_covariance_is_the_sandwich_of_noise_and_process(refitted):
     """In full, J^+ V J^+^T, V by one standard deviation of each independent source of error."""
     found = refitted
     (sweep,) = found.covariance_tests
-    model, random = found.model, sweep.noise.random_noise(sweep.name, sweep.held_value, sweep.step)
-    run = np.unique(np.stack((sweep.held_value, sweep.repeat)), axis=1, return_inverse=True)[1]
+    model, random = found.model, sweep.noise.random_noise(sweep.name, sweep.run_level, sweep.step)
+    run = np.unique(np.stack((sweep.run_level, sweep.repeat)), axis=1, return_inverse=True)[1]
     shared, by_level = (np.array(error)[:, None] for error in (sweep.noise.shared, sweep.noise.level))
     assert by_level.all(), "repeats do not reveal errors of levels"
     sources = [
         found.smooth_error.columns,
         *(sweep.whiten(unit * np.diag(size).astype(complex)) for unit, size in zip((1.0, 1.0j), random, strict=True)),
         *(np.array(sweep.shared_error_columns(run == i)) * shared for i in np.unique(run)),
-        *(np.array(sweep.shared_error_columns(sweep.held_value == x)) * by_level for x in np.unique(sweep.held_value)),
+        *(np.array(sweep.shared_error_columns(sweep.run_level == x)) * by_level for x in np.unique(sweep.run_level)),
     ]
     slopes = found.coordinates.slopes(model.values)
     moved = np.linalg.pinv(jacobian(model, [sweep], FIVE).T) @ np.concatenate(sources).T * slopes[:, None]

@@ -101,9 +101,9 @@ def _draw_sweep(panels: Sequence[Axes], sweep: Sweep) -> Axes:
     x = sweep.step * (length.factor if by_amplitude else 1.0)
     x_label = header_of(place, "amplitude" if by_amplitude else "frequency")
     pair = ResponsePair(panels, place, float(np.abs(sweep.stiffness).max()), x_label, x)
-    levels = np.unique(sweep.held_value)
+    levels = np.unique(sweep.run_level)
     for level, look in zip(levels, style.styles(levels.size, fixed_quantity), strict=True):
-        at_level = sweep.held_value == level
+        at_level = sweep.run_level == level
         means = pd.Series(sweep.stiffness[at_level]).groupby(x[at_level]).mean()
         pair.plot(means.index.to_numpy(), means.to_numpy(), color=look.color, ls=look.dashes, lw=0.8)
         pair.plot(x[at_level], sweep.stiffness[at_level], look.marker, color=look.color, alpha=0.75, **style.POINT)
