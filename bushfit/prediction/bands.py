@@ -78,7 +78,7 @@ def alternative_models(result: Result, *, rig: bool) -> Iterator[tuple[Result, M
 
     Args:
         result: fitted result.
-        rig: True to keep the effects of the rig, as in the tests; False for the models of `car_models`.
+        rig: True to keep the effects of the rig, as in the tests; False for the bushing alone, as in a car.
 
     Yields:
         The result with the parameter errors of the alternative and without a model error; and the alternative model.

@@ -46,7 +46,7 @@ _HOLDING = {**dict.fromkeys(CONDITIONS, ""), "direction": "not stated", "part": 
 
 
 def find_lines_above(table: Table) -> list[Line]:
-    """Find the lines that belong to a table without being part of it.
+    """Find the lines above a table, and the notes below it.
 
     Args:
         table: table of a file.

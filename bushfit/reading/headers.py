@@ -170,7 +170,7 @@ class Column(Heading):
 
     @property
     def indices(self) -> tuple[int, ...]:
-        """Positions of the columns that contain its numbers."""
+        """Indices of the columns from which its values are computed: one, or two for a difference."""
         return (self.index,) if self.subtracted is None else (self.index, self.subtracted)
 
 

@@ -143,7 +143,7 @@ def _by_rank(amplitude: Floats, group: NDArray[np.intp], *, fewest_points: int) 
 
 
 def group_rows(*keys: Floats | NDArray[np.intp]) -> list[NDArray[np.intp]]:
-    """Group n rows whose values agree in all keys, such as frequency and amplitude, (n,) each; return their indices."""
+    """Row indices of each group of rows that agree in all keys, such as frequency and amplitude, (n,) each."""
     group = _group_numbers(*keys)
     return np.split(np.argsort(group, kind="stable"), np.cumsum(np.bincount(group))[:-1])
 
