@@ -180,7 +180,7 @@ def claims(data: PreparedCampaign, without: Collection[str]) -> list[Claim]:
 
 @dataclass(frozen=True, eq=False)
 class ClaimScreening:
-    """Screening of recording mistakes by the misfit of the paper's five-parameter model to the corrected tests.
+    """Screening of recording mistakes by the misfit of the five-parameter model to the corrected tests.
 
     Args:
         data: the campaign as it was read.
@@ -216,7 +216,7 @@ class ClaimScreening:
         return selected[:limit]
 
     def misfit(self, claim: Claim | None) -> float:
-        """Smallest sum of squared residuals of the paper's five-parameter model, after correction of one mistake.
+        """Smallest sum of squared residuals of the five-parameter model (mu, m, alpha, sigma_fmax, eps_half).
 
         Args:
             claim: mistake that is corrected first; None for the tests as recorded.

@@ -39,7 +39,7 @@ class EffectEntry(TypedDict):
         name: name of the effect or mistake.
         level: material, component, instrument or record; "unresolved" for an effect that has twins.
         twins: effects of the rig that tests of the bushing cannot distinguish from this effect.
-        replaces: branch of the paper's model that the effect replaces; null if it is added.
+        replaces: branch (elastic, springpot or friction) that the effect replaces; null if it is added.
         test: name of the test with the mistake; null for an effect.
         sentence: description of the effect or mistake.
         correction: line for the campaign file that corrects the mistake; null for an effect.

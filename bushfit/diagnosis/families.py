@@ -94,7 +94,7 @@ def known_families(model: Model, data_sets: Sequence[MeasuredTest]) -> tuple[str
     """List the model families that can replace a model: each effect of rate combined with each effect of amplitude.
 
     The effect of temperature is added if the tests differ in temperature and the model has no such effect. The model
-    itself, with the paper's branches unchanged, is left out.
+    itself, with the branches elastic, springpot and friction unchanged, is left out.
 
     Args:
         model: starting model.

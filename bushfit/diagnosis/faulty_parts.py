@@ -76,7 +76,7 @@ class FaultyPart(Explanation):
 
     @property
     def forms(self) -> tuple[Form, ...]:
-        """Forms of the errors, which are equally probable: most causes change the gain of a level or repeat alone."""
+        """Possible forms of the errors, equally probable: "shift", "gain" and "points", as far as the part has them."""
         by_family: dict[str, tuple[Form, ...]] = {"loop": ("shift",), "frequency": ("shift", "points")}
         return by_family.get(self.family, ("shift", "gain", "points"))
 

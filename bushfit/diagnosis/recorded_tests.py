@@ -123,7 +123,7 @@ class ExplanationColumns:
 
 
 def modulus_deviation(fit: FitResult) -> float:
-    """Deviation of the median shear modulus of the tests from that of bushing rubber, in standard deviations."""
+    """Deviation of ln(median shear modulus of the tests) from that of bushing rubber, in standard deviations."""
     moduli = [
         np.median(np.abs(test.measured)) / stiffness_per_modulus(fit.model.bushing, test.direction)
         for test in fit.data_sets

@@ -147,7 +147,7 @@ class DiagnosisWriter:
         return replace(diagnosis, after=after, remainder=find_regions(after), result=result)
 
     def _undecided_diagnosis(self, first: Composition, closing: Closing) -> Diagnosis:
-        """Diagnosis of a gap with several possible causes: what closes it, the causes, and the test that decides."""
+        """Diagnosis of a gap with several possible causes: a smooth correction, the causes, and a test that decides."""
         reported, gap = self.finding.reported, closing.gap
         candidates = self._candidates
         leader = candidates[0] if candidates else first

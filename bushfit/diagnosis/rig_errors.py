@@ -124,10 +124,11 @@ class RigErrors:
 
     @cached_property
     def kernels(self) -> tuple[Array, Array]:
-        """Parts of the inverse covariance of the residuals (scatter and rig errors), for each combination of sizes.
+        """Parts of the inverse covariance of the residuals (noise and rig errors), for each combination of sizes.
 
         Returns:
-            K = D (1 + D W N^-1 W^T D)^-1 D with scatter N and rig errors W of sizes D, (blocks, combinations, w, w);
+            K = D (1 + D W N^-1 W^T D)^-1 D with noise variances N and rig errors W of sizes D, (blocks, combinations,
+            w, w);
             and the natural log of the determinant of the covariance, (combinations,).
 
         Notes:
@@ -182,9 +183,9 @@ def rig_errors(fit: FitResult, rig: RigSettings) -> RigErrors:
 
 
 def noise_cases(fit: FitResult) -> list[NoiseCase]:
-    """List the assumptions on the sizes of the rig's errors and of the rubber's smooth deviation from the model's laws.
+    """List the combinations of assumed sizes of the rig's errors and of the rubber's smooth deviation from the model.
 
-    The point-to-point scatter has several sizes if it was estimated from few repeats.
+    The random noise from point to point has several sizes if it was estimated from few repeats.
 
     Args:
         fit: the fitted model and the tests.

@@ -160,14 +160,14 @@ class Search:
         return sorted(self._known.values(), key=lambda hypothesis: -hypothesis.log_posterior)
 
     def _is_decided(self) -> bool:
-        """True if one hypothesis (one explanation, or that nothing is missing) is nearly certain and fits the tests."""
+        """True if one explanation, or that nothing is missing, has a probability of 97 % or more and fits the tests."""
         finding = decide_verdict(self._ordered_hypotheses(), self.settings.tolerance)
         if finding.verdict == "consistent":
             return finding.nothing >= NAMED and self.root.linear.p_value() >= DOES_NOT_FIT
         return finding.verdict == "named" and finding.reported[0].best.refitted
 
     def _is_power_law(self) -> bool:
-        """True if a single power law is nearly certain and fits; more would fit the error of its linearisation."""
+        """True if a power law alone has a probability of 97 % or more and fits; more would fit its linearisation."""
         finding = decide_verdict(self._ordered_hypotheses(), self.settings.tolerance)
         if finding.verdict == "consistent":
             return False

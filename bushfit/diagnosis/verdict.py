@@ -97,9 +97,10 @@ class Finding:
     Args:
         verdict: verdict in one word.
         nothing: probability that nothing is missing beyond noise and tolerance.
-        reported: explanations to report, the nearly certain one or the most probable first; empty if consistent.
+        reported: explanations to report, the most probable first, only one if its probability is 97 % or more; empty
+            if nothing is missing.
         leads: names of effects that reduce the gap but do not explain it.
-        names: names of effects that are certain, which are all or a part of the explanation.
+        names: names of effects with a probability of 97 % or more, which are all or a part of the explanation.
     """
 
     verdict: Verdict
@@ -156,10 +157,10 @@ def decide_verdict(hypotheses: Sequence[Hypothesis], tolerance: float, *, gap_st
 
 
 def _verdict_on_parts(likely: Sequence[Composition], nothing: float, leads: Sequence[str]) -> Finding:
-    """Decide the verdict if all parts of the most probable explanation are nearly certain.
+    """Decide the verdict if the parts of the most probable explanation have a probability of 97 % or more.
 
     Args:
-        likely: probable explanations, the first with the parts that are certain.
+        likely: probable explanations, the first with these parts.
         nothing: probability that nothing is missing.
         leads: names of effects that reduce the gap but do not explain it.
     """

@@ -41,8 +41,8 @@ def diagnose(
 
     Args:
         data: campaign with prepared tests; all directions are used.
-        model: starting model, whose effects are kept and whose values are refitted; None for the paper's three branches
-            and the effects of [fit].
+        model: starting model, whose effects are kept and whose values are refitted; None for the branches elastic,
+            springpot and friction and the effects of [fit].
         settings: limits, and effects to adopt or to leave out; None for the defaults.
 
     Returns:
@@ -109,7 +109,7 @@ def _initial_fit(
 
     Args:
         data: campaign with prepared tests.
-        model: starting model; None for the paper's three branches and the effects of [fit].
+        model: starting model; None for the branches elastic, springpot and friction and the effects of [fit].
         settings: settings of the diagnosis, with the effects to adopt.
         fixed: names of parameters that are not fitted.
 

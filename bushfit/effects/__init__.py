@@ -145,13 +145,13 @@ BASE = ("elastic", "springpot", "friction")
 
 
 def with_base(names: Iterable[str]) -> tuple[str, ...]:
-    """Add effects to the paper's model, leaving out the branches of the paper that they replace.
+    """Add effects to the branches elastic, springpot and friction, leaving out the branches that they replace.
 
     Args:
         names: names of the effects to add.
 
     Returns:
-        Names of the remaining branches of the paper, followed by the added names.
+        Names of the remaining branches, followed by the added names.
 
     >>> with_base(["sliders", "inertia"])
     ('elastic', 'springpot', 'sliders', 'inertia')
@@ -206,7 +206,7 @@ def twins_of(name: str) -> tuple[str, ...]:
 
 
 def qualified_name(effect: Effect, parameter: Parameter) -> str:
-    """Name of a parameter in files and reports: `<effect>.<name>`, or `<name>` for the paper's three effects.
+    """Name of a parameter in files and reports: `<effect>.<name>`, or `<name>` for elastic, springpot and friction.
 
     If the effect is for one direction or specimen, as `stiffness_factor.radial`, its parameter has the effect's name.
 

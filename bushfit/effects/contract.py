@@ -84,7 +84,7 @@ class Parameter:
     """One parameter of an effect.
 
     Args:
-        name: ASCII name; files and reports use `<effect>.<name>`, except for the paper's effects.
+        name: ASCII name; files and reports use `<effect>.<name>`, except for elastic, springpot and friction.
         unit: SI unit; "1" for a ratio.
         bounds: smallest and largest plausible value.
         neutral: value at which the effect vanishes; None if another parameter has this value.
@@ -204,7 +204,7 @@ class Effect:
             of the formula needs no warning; None for other effects.
         twins: effects with the same equation in all tests, mostly of the rig. The effect of the bushing, which lists
             the twins, is proposed; the tests determine its size but cannot distinguish it from its twins.
-        replaces: name of the paper's branch that the effect replaces; None if the effect is added.
+        replaces: name of the branch (elastic, springpot or friction) that the effect replaces; None if it is added.
         depends_on: names of the `RubberConditions` on which the effect depends.
         assumption: warning on the value of these quantities in a prediction; None for effects of the rig.
         in_place_of: function that converts the values of the replaced branch to start values for a fit, the most
@@ -265,7 +265,7 @@ class Branch(Effect):
     Args:
         modulus: (values, omega [rad/s], strain amplitude) -> complex modulus s~ / (2 e~) of the first harmonic [Pa].
         stress: (values, strain history) -> stress [Pa].
-        uses: names of the paper's parameters that the branch reads.
+        uses: names of parameters of other branches, such as mu, that the branch reads.
         size: name of the parameter that the modulus of a linear viscoelastic branch is proportional to, so that Maxwell
             arms can replace the branch; None for other branches. Over a steady cycle, the modulus of a linear branch
             gives every harmonic of the stress, mean included, and `stress` is not used.

@@ -31,8 +31,8 @@ class History:
         solved: previous solutions of implicit equations (of a compliance) for this motion, by name; start values for
             the next solution.
         accuracy: tolerance of implicit equations for this motion, relative to its maximum.
-        second_order: True for fractional derivatives of second order in the step, False for the paper's sum (Eq. 3),
-            which is of first order. A steady state has neither error.
+        second_order: True for fractional derivatives of second order in the step, False for the sum of Garcia Tarrago
+            et al. 2007, Eq. 3, which is of first order. A steady state has neither error.
 
     >>> cycle = History.steady(np.array([0.0, 1.0, 0.0, -1.0]), 5.0)
     >>> cycle.step, cycle.amplitude, cycle.turning.strides

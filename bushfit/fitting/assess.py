@@ -53,8 +53,8 @@ def covariance(
 
     Args:
         model: fitted model.
-        stages: fits of the procedure, in order, such as the static and the dynamic fit of the paper: their free
-            parameters, and their tests with the weights of the fit.
+        stages: fits of the procedure, in order, such as a static and a dynamic fit: their free parameters, and their
+            tests with the weights of the fit.
         fixed: covariance of parameters that all stages kept fixed; None if these are exact.
         smooth_error: smooth error of a model that misses its tests by more than their noise; None if the model fits.
 
@@ -286,7 +286,7 @@ def preload_ranges(data_sets: Sequence[MeasuredTest]) -> list[PreloadRange]:
 
 
 def implausible_modulus(bushing: Bushing | None, data_sets: Sequence[MeasuredTest]) -> list[Caveat]:
-    """Warning about shear moduli that no rubber has or that differ too much between tests, usually due to a wrong unit.
+    """Warning about shear moduli that no rubber has (below 50 kPa, above 100 MPa, or 20 times apart): wrong units.
 
     Returns:
         At most one warning.

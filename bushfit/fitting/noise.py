@@ -201,7 +201,7 @@ def _scatter_growth(levels: Sequence[LevelNoise]) -> tuple[float, float] | None:
     from scipy.optimize import minimize_scalar
 
     def unlikely(exponent: float) -> float:
-        """Negative log likelihood of the deviations if the scatter grows with this power of the step."""
+        """Negative log likelihood of the random errors if their variance grows with this power of the step."""
         parts = np.split(ratio * np.exp(-exponent * centred), np.cumsum([log.size for log in logs])[:-1])
         return sum(part.size * float(np.log(part.mean())) for part in parts)
 

@@ -164,7 +164,7 @@ class PreparedCampaign:
         return {name: setting.value for name, setting in settings.items() if setting.value is not None}
 
     def start_values(self, data_sets: Sequence[MeasuredTest]) -> dict[str, float]:
-        """Start values of the paper's parameters [SI] by name: given in [fit], or else estimated from the tests."""
+        """Start values of mu, m, alpha, sigma_fmax and eps_half [SI] by name: given in [fit], or else estimated."""
         with error_location(self.campaign.path):
             return start_values(self.campaign.bushing, data_sets, self.given_values)
 
@@ -218,21 +218,21 @@ class PreparedCampaign:
         return FitProblem(model, data_sets, names, self.bounds)
 
     def free_names(self, names: Sequence[str]) -> tuple[str, ...]:
-        """Select the parameter names that the campaign does not fix."""
+        """Names among `names` of the parameters that [fit] of the campaign does not fix."""
         settings = self.campaign.fit.parameters
         return tuple(name for name in names if name not in settings or settings[name].vary)
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """Names of the effects of the model in [fit]: the paper's three branches and the added effects."""
+        """Names of the effects of the model in [fit]: elastic, springpot and friction, and the added effects."""
         return with_base(self.campaign.fit.effects)
 
     def select_tests(self, places: Sequence[str] | None) -> list[MeasuredTest]:
         """Select the tests of some directions and specimens.
 
         Args:
-            places: names of directions, specimens or bushings. None: all specimens, and the axial tests as in the
-                paper; without axial loops, all loops, and without axial sweeps, all sweeps.
+            places: names of directions, specimens or bushings. None: all specimens, and the axial tests; without
+                axial loops, all loops, and without axial sweeps, all sweeps.
 
         Returns:
             Loops, then sweeps.

@@ -56,7 +56,7 @@ _ADVISED = ("misfit", "model_error", "levels_disagree", "unfitted_test_missed")
 
 @dataclass(frozen=True, eq=False)
 class TwoStep:
-    """Result of the paper's procedure, repeated until static and dynamic fit agree.
+    """Result of alternate static and dynamic fits (Garcia Tarrago et al. 2007, section 4), repeated until they agree.
 
     Args:
         passes: parameter values by name [SI] after each pass.
@@ -78,7 +78,7 @@ def fit_joint(
 
     Args:
         data: prepared campaign.
-        effects: names of the effects of the model; None: the paper's three branches and the added effects of [fit].
+        effects: names of the effects of the model; None: elastic, springpot and friction, and the effects of [fit].
         directions: directions and specimens whose tests to use; see `PreparedCampaign.select_tests`.
         profile: True to add 95 % intervals by profile likelihood.
 
@@ -116,7 +116,7 @@ def fit_joint(
 
 
 def fit_static(data: PreparedCampaign, springpot: Result | None = None) -> Result:
-    """Fit mu, sigma_fmax and eps_half to the loops, with the springpot fixed (paper, section 4.1).
+    """Fit mu, sigma_fmax and eps_half to the loops, with m and alpha fixed (Garcia Tarrago et al. 2007, section 4.1).
 
     m and alpha are taken from `springpot`, or from the campaign's [fit] if it gives both. Otherwise the springpot is
     left out, and a warning states the effect.
@@ -142,9 +142,10 @@ def fit_static(data: PreparedCampaign, springpot: Result | None = None) -> Resul
 
 
 def fit_dynamic(data: PreparedCampaign, static: Result) -> Result:
-    """Fit m and alpha to the smallest-amplitude sweep, with the static parameters fixed (paper, section 4.2).
+    """Fit m and alpha to the smallest-amplitude sweep, with mu, sigma_fmax and eps_half fixed.
 
-    The errors of the static parameters are propagated into those of m and alpha.
+    The errors of these static parameters are propagated into those of m and alpha (Garcia Tarrago et al. 2007, section
+    4.2).
 
     Args:
         data: prepared campaign.
@@ -240,7 +241,7 @@ def _springpot_warning(data: PreparedCampaign, static: FitResult) -> Caveat:
 def _fit_step(
     data: PreparedCampaign, tests: Sequence[MeasuredTest], fixed: Mapping[str, float], start: Model | None = None
 ) -> FitResult:
-    """Fit one step, static or dynamic, of the paper's procedure with lmfit.
+    """Fit either the static parameters (mu, sigma_fmax, eps_half) or the dynamic ones (m, alpha) with lmfit.
 
     Args:
         data: prepared campaign.

@@ -195,7 +195,7 @@ def to_unit_interval(values: Array) -> Array:
 
 
 def _project_out(basis: Array, values: Array) -> Array:
-    """Independent residuals, (n - k, m), of values, (n, m), after a least-squares fit of k functions, (n, k)."""
+    """Residuals of values, (n, m), after a least-squares fit of k functions, (n, k), as n - k independent rows."""
     (reflections, factors), _ = qr(basis, mode="raw")
     turned, *_ = lapack.dormqr("L", "T", reflections, factors, values, lwork=values.shape[1])
     return np.asarray(turned[basis.shape[1] :])

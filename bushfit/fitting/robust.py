@@ -57,12 +57,12 @@ def solve_problem(problem: FitProblem, *, robust: bool = False, lmfit: bool = Fa
 
     soft_l1 minimises the sum of 2 C^2 (sqrt(1 + (z/C)^2) - 1), C = 2, over the distances z of points in units of noise.
     The covariance is that of least squares with all weights equal to the efficiency of this loss under normal noise.
-    Outliers of loops already have weight 0, see `prepared_loop`.
+    Outliers of loops already have weight 0, see `prepare_loop`.
 
     Args:
         problem: parameters to fit, tests and bounds.
         robust: True for soft_l1.
-        lmfit: True to minimise with lmfit, as the paper's procedure does.
+        lmfit: True to minimise with lmfit, as in alternate static and dynamic fits.
 
     Returns:
         Result of the fit, with its outliers.
@@ -109,7 +109,7 @@ def outlier_warnings(outliers: Sequence[Outlier], *, robust: bool) -> Iterator[C
     """Yield warnings about the outliers that the fit includes and those that it leaves out, with the first rows.
 
     Several tests of one file are named, and their rows are counted from 1. Outliers of the displacement are always left
-    out, see `prepared_loop`.
+    out, see `prepare_loop`.
 
     Args:
         outliers: outliers of all tests.

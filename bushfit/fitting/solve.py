@@ -14,7 +14,7 @@ from bushfit.model.model import Model
 
 
 def solve_with_lmfit(problem: FitProblem) -> FitResult:
-    """Minimise the sum of squared residuals by MINPACK through lmfit, as the paper's static and dynamic fits do.
+    """Minimise the sum of squared residuals by MINPACK through lmfit, for alternate static and dynamic fits.
 
     Args:
         problem: parameters to fit, tests and bounds.

@@ -88,7 +88,8 @@ class Bushing:
         name: label of the bushing.
         inner_radius, outer_radius: radii a and b of the rubber tube [m].
         length: mean length L of the rubber [m].
-        shape: "paper" for the paper's radial formulas, "calibrated" to correct them by finite elements.
+        shape: "paper" for the radial formulas of Garcia Tarrago et al. 2007, "calibrated" to correct them by finite
+            elements.
 
     Raises:
         ModelError: a radius or length is not positive and finite, a >= b, or the shape is "calibrated" outside the

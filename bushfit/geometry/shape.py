@@ -72,7 +72,7 @@ def coordinates(radius_ratio: float, slenderness: float) -> tuple[float, float]:
 
 
 def radial_correction(radius_ratio: float, slenderness: float) -> Correction | None:
-    """Compute the factors that bring the paper's radial stiffness and strain of one shape to finite elements.
+    """Factors from radial stiffness and strain by Garcia Tarrago et al. 2007 to those by finite elements, for a shape.
 
     Args:
         radius_ratio: a/b, inner over outer radius.

@@ -38,7 +38,7 @@ class BushingTable:
         inner_radius_m: inner radius of the rubber [m].
         outer_radius_m: outer radius of the rubber [m].
         length_m: mean length of the rubber [m].
-        shape: "paper" for the radial formulas of the paper, "calibrated" for finite elements.
+        shape: "paper" for the radial formulas of Garcia Tarrago et al. 2007, "calibrated" for finite elements.
     """
 
     name: Name

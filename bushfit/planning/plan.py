@@ -33,7 +33,7 @@ class Plan:
         tests: runs of the rig, in the order in which they are made.
         purposes: sentence on the accuracy that is lost without a test and all its repeats, for each test.
         document: content of plan.json: durations of the runs and expected results, compared with the standard programme
-            (the paper's tests, repeated as often as the same hours allow).
+            (the tests of Garcia Tarrago et al. 2007, repeated as often as the same hours allow).
     """
 
     knowledge: Knowledge

@@ -70,7 +70,7 @@ def simulate(truth: Model, plan: SimulateSettings) -> Simulated:
 
     Args:
         truth: true model, including effects of the rig.
-        plan: settings [simulate] with tests and noise; without tests, the tests of the paper are simulated.
+        plan: settings [simulate] with tests and noise; without tests, those of Garcia Tarrago et al. 2007.
     """
     return measure(undisturbed(truth, plan), plan)
 

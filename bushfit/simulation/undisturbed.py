@@ -79,7 +79,7 @@ def undisturbed(truth: Model, plan: SimulateSettings, *, steps_per_cycle: int = 
 
     Args:
         truth: true model, including effects of the rig.
-        plan: settings [simulate] with the tests; without tests, the tests of the paper are simulated.
+        plan: settings [simulate] with the tests; without tests, those of Garcia Tarrago et al. 2007.
         steps_per_cycle: time steps per cycle of the sweeps; the error of the time integration is inversely
             proportional.
 
@@ -87,7 +87,7 @@ def undisturbed(truth: Model, plan: SimulateSettings, *, steps_per_cycle: int = 
         The tests with their exact results.
 
     Raises:
-        CampaignError: there are no tests, and no bushing for the tests of the paper.
+        CampaignError: there are no tests, and no bushing for those of the paper.
         ModelError: a test is in a direction but there is no bushing, or an effect has no law in the time domain.
     """
     loops, sweeps, resonances = plan.loops, plan.sweeps, plan.resonances
