@@ -198,7 +198,7 @@ def moves_along(table: Table, first: Column, second: Column) -> bool:
     if not (first.unit and second.unit and units.is_compatible(second.unit, first.unit)):
         return False
     channels = replace(table, roles={"first": first, "second": second})  # whose cells show the decimal mark
-    start = channels.parse(next(channels.blocks()), frozenset((first.index, second.index)))  # far beyond the first rows
+    start = channels.parse(next(channels.chunks()), frozenset((first.index, second.index)))  # far beyond the first rows
     numbers = np.array([start[first.index], start[second.index]]).T if start else first_numbers(table, (first, second))
     numbers = numbers * [units.si_factor(unit, first.unit) for unit in (first.unit, second.unit)]
     spans = [float(np.ptp(values)) for values in numbers.T] if len(numbers) else [0.0, 0.0]

@@ -72,25 +72,25 @@ def column_texts(table: Table, *indices: int) -> Iterator[ColumnTexts]:
     """
     import pandas as pd
 
-    blocks = [_cells_of_block(table, block, indices) for block in table.blocks()] if indices else []
+    chunks = [_cells_of_chunk(table, chunk, indices) for chunk in table.chunks()] if indices else []
     for index in indices:
-        cells = pd.concat([frame[index] for frame in blocks], ignore_index=True)
+        cells = pd.concat([frame[index] for frame in chunks], ignore_index=True)
         texts = cells.map(lambda cell: _text(cell).strip(" #")).astype(object)
         is_of_remarks = texts[:1].eq("").any()  # a column of merged cells does not begin empty
         codes, distinct = pd.factorize(texts if is_of_remarks else texts.mask(texts == "").ffill())
         yield ColumnTexts(list(distinct), codes)
 
 
-def _cells_of_block(table: Table, block: RowSource, indices: Sequence[int]) -> pd.DataFrame:
-    """Read columns of a block of rows as texts or numbers; the columns of the result are named by their indices."""
+def _cells_of_chunk(table: Table, chunk: RowSource, indices: Sequence[int]) -> pd.DataFrame:
+    """Read columns of a chunk of rows as texts or numbers; the columns of the result are named by their indices."""
     import pandas as pd
 
-    if isinstance(block, Text) and table.layout.delimiter != " " and not table.marks and b'"' not in block.data:
-        is_clean, types = table.parse(block, table.needed) is not None, dict.fromkeys(indices, "category")
-        frame = block.frame(table.layout, types, len(table.headers), ".") if is_clean else None
+    if isinstance(chunk, Text) and table.layout.delimiter != " " and not table.marks and b'"' not in chunk.data:
+        is_clean, types = table.parse(chunk, table.needed) is not None, dict.fromkeys(indices, "category")
+        frame = chunk.frame(table.layout, types, len(table.headers), ".") if is_clean else None
         if isinstance(frame, pd.DataFrame):
             return frame
-    rows = [row for _, row in table.rows(block)]
+    rows = [row for _, row in table.rows(chunk)]
     return pd.DataFrame({index: pd.Series([row[index] for row in rows], dtype=object) for index in indices})
 
 

@@ -204,9 +204,9 @@ def read_condition(table: Table, role: str, motion: Motion) -> ConditionColumn |
 
 def _numbers(table: Table, column: Column) -> Floats:
     """Numbers in a column, (n,), in the unit of the file; an empty cell repeats the number above, NaN for a text."""
-    blocks = [table.parse(block, table.needed | {column.index}) for block in table.blocks()]
-    if blocks and all(blocks):
-        return np.concatenate([block[column.index] for block in blocks if block])
+    chunks = [table.parse(chunk, table.needed | {column.index}) for chunk in table.chunks()]
+    if chunks and all(chunks):
+        return np.concatenate([chunk[column.index] for chunk in chunks if chunk])
     (texts,) = column_texts(table, column.index)
     notations = (table.numerals, Numerals())  # the second for numbers of a workbook
     found = ([way.value(text) for way in notations] for text in texts.distinct)

@@ -34,7 +34,7 @@ _GROUP_BY_BLANK = re.compile(rb"\d \d{3}(?!\d)")
 
 @dataclass(frozen=True, eq=False)
 class Text:
-    """Delimited text in UTF-8, or a block of its lines.
+    """Delimited text in UTF-8, or a chunk of its lines.
 
     Args:
         data: bytes of the text.
@@ -72,14 +72,14 @@ class Text:
         ends = [0, *(end.end() for end in islice(_LINE_END.finditer(self.data), max(after - self.before, 0)))]
         return ends[-1] if len(ends) > after - self.before else len(self.data)
 
-    def blocks(self, after: int) -> Iterator[Text]:
-        """Yield the text below the line with number `after` in blocks of a few MiB."""
+    def chunks(self, after: int) -> Iterator[Text]:
+        """Yield the text below the line with number `after` in chunks of a few MiB."""
         start = self.offset(after)
         while start < len(self.data):
             end = self.data.find(b"\n", start + CHUNK_BYTES) + 1 or len(self.data)
-            block = Text(self.data[start:end], self.encoding, after)
-            yield block
-            start, after = end, after + block.data.count(b"\n")
+            chunk = Text(self.data[start:end], self.encoding, after)
+            yield chunk
+            start, after = end, after + chunk.data.count(b"\n")
 
     def may_contain(self, sign: str, layout: Layout) -> bool:
         """Return True if cells below the header can contain a decimal mark or thousands separator."""
@@ -100,7 +100,7 @@ class Text:
         return {word.decode("utf-8", "replace").strip() for word in set(first.findall(b"\n" + self.data))}
 
     def frame(self, layout: Layout, types: Mapping[int, Any], width: int, decimal: str) -> Any:
-        """Read columns of a block with pandas.
+        """Read columns of a chunk with pandas.
 
         Args:
             layout: location of the table.
@@ -109,7 +109,7 @@ class Text:
             decimal: decimal mark.
 
         Returns:
-            Data frame with these columns; None if pandas cannot parse the block, or rows differ in length.
+            Data frame with these columns; None if pandas cannot parse the chunk, or rows differ in length.
 
         Notes:
             pandas does not check the length of rows if some columns are skipped; the delimiters are counted instead. An

@@ -107,23 +107,23 @@ class Table:
         """Texts of the header cells of the table."""
         return self.layout.headers
 
-    def blocks(self) -> Iterator[RowSource]:
-        """Yield the rows of the table in blocks to be read one by one; a single block for selected rows."""
+    def chunks(self) -> Iterator[RowSource]:
+        """Yield the rows of the table in chunks of a few MiB, to limit memory; a single chunk for selected rows."""
         if isinstance(self.source, Text) and self.selected is None:
-            return self.source.blocks(self.layout.lines_before_data)
+            return self.source.chunks(self.layout.lines_before_data)
         return iter([self.source])
 
-    def rows(self, block: RowSource | None = None, left_out: list[FaultyRow] | None = None) -> Iterator[Row]:
+    def rows(self, chunk: RowSource | None = None, left_out: list[FaultyRow] | None = None) -> Iterator[Row]:
         """Yield the line number and the cells of each row of data; other rows, such as remarks and means, are left out.
 
         Args:
-            block: block of the source; default the whole source.
+            chunk: successive rows of the source to read; default all rows of the source.
             left_out: list to which the other rows are added.
 
         Raises:
             MeasurementError: a line or a quoted cell is far too long.
         """
-        for position, (line, cells, fault) in enumerate(self.all_rows(block)):
+        for position, (line, cells, fault) in enumerate(self.all_rows(chunk)):
             if fault is not None and left_out is not None:
                 left_out.append((line, cells, fault))
             if fault is None and (self.selected is None or position in self.selected):
@@ -140,11 +140,11 @@ class Table:
         """Cells of each of the first thousand rows of data; one row of empty cells if there are none."""
         return [cells for _, cells in islice(self.rows(), _FIRST)] or [[""] * len(self.headers)]
 
-    def all_rows(self, block: RowSource | None = None) -> Iterator[tuple[int, Sequence[str | float], str | None]]:
+    def all_rows(self, chunk: RowSource | None = None) -> Iterator[tuple[int, Sequence[str | float], str | None]]:
         """Yield line number, cells and fault of each non-empty row below the header, whether it is data or not.
 
         Args:
-            block: block of the source; default the whole source.
+            chunk: successive rows of the source to read; default all rows of the source.
 
         Yields:
             Line number, cells, and the reason why the row is not data (see `row_fault`); None for a row of data.
@@ -152,7 +152,7 @@ class Table:
         level, is_other_table = dict[int, str | float](), False
         vocabulary = Vocabulary(names_for_motion(self.names, self.motion))
         with error_location(self.file):
-            for line in (block or self.source).lines(self.layout.lines_before_data):
+            for line in (chunk or self.source).lines(self.layout.lines_before_data):
                 if self.layout.numbered or not is_comment(line.content, self.layout.delimiter):
                     cells = cells_of(line, self.layout.delimiter)
                     if any(cell != "" for cell in cells):
@@ -168,15 +168,15 @@ class Table:
                             is_other_table = not is_same and (is_other_table or begins_other_table(texts))
                         yield line.number, cells, "other" if is_other_table else row_fault(self, cells)
 
-    def parse(self, block: RowSource, indices: frozenset[int]) -> Mapping[int, Floats] | None:
-        """Read columns of a block at once, in units of the file.
+    def parse(self, chunk: RowSource, indices: frozenset[int]) -> Mapping[int, Floats] | None:
+        """Read columns of a chunk of rows at once, in units of the file.
 
         Args:
-            block: block of the source.
+            chunk: successive rows of the source to read.
             indices: indices of the columns.
 
         Returns:
-            Numbers by column index, (n,) each; None if the block has to be read row by row, because it has rows without
+            Numbers by column index, (n,) each; None if the chunk has to be read row by row, because it has rows without
             data or numbers in another notation.
 
         Notes:
@@ -185,10 +185,10 @@ class Table:
         """
         if self.selected is not None or not indices.isdisjoint((*self.clocks, *self.marks)):
             return None
-        if isinstance(block, Channels) and block.numeric >= indices:
-            return {index: block.arrays[index] for index in indices}
+        if isinstance(chunk, Channels) and chunk.numeric >= indices:
+            return {index: chunk.arrays[index] for index in indices}
         first = list(map(str, self.first_row))
-        if not isinstance(block, Text) or not indices or len(first) != len(self.headers):
+        if not isinstance(chunk, Text) or not indices or len(first) != len(self.headers):
             return None
         if self.first_decimal is None:
             return None
@@ -196,8 +196,8 @@ class Table:
         numeric = [index for index, cell in enumerate(first) if notation.allows(cell)]
         if not indices <= {*numeric}:
             return None  # pandas takes TRUE for 1
-        frame = block.frame(self.layout, dict.fromkeys(numeric, float), len(first), notation.decimal)
-        words = block.first_words(self.layout.delimiter) if numeric[0] else ()
+        frame = chunk.frame(self.layout, dict.fromkeys(numeric, float), len(first), notation.decimal)
+        words = chunk.first_words(self.layout.delimiter) if numeric[0] else ()
         if frame is None or any(is_summary_row([word]) for word in words):
             return None
         return {index: frame[index].to_numpy() for index in indices}
@@ -286,7 +286,7 @@ class Table:
             if column.subtracted is not None
         }
         wanted = {**wanted, **subtracted}
-        parts = [part for block in table.blocks() for part in table._read_block(block, wanted, left_out)]
+        parts = [part for chunk in table.chunks() for part in table._read_chunk(chunk, wanted, left_out)]
         if left_out:
             refuse_other_columns(table, left_out, Vocabulary(names_for_motion(self.names, self.motion)))
         values = {role: np.concatenate([np.empty(0), *(part.pop(role) for part in parts)]) for role in wanted}
@@ -332,28 +332,28 @@ class Table:
             found = f'"{cells[column.index]}"'
             raise self.error(problem, line=line, column=column, found=found, expected=expected, hint=hint)
 
-    def _read_block(
-        self, block: RowSource, wanted: Mapping[str, Column], left_out: list[FaultyRow]
+    def _read_chunk(
+        self, chunk: RowSource, wanted: Mapping[str, Column], left_out: list[FaultyRow]
     ) -> Iterator[dict[str, Floats]]:
-        """Read a block of rows as numbers: at once if all its rows are data, else row by row.
+        """Read a chunk of rows as arrays of numbers [SI] by role: at once if all its rows are data, else row by row.
 
         Args:
-            block: block of the source.
+            chunk: successive rows of the source to read.
             wanted: columns by role such as "force", with their factors to SI.
             left_out: list to which rows without data are added.
 
         Raises:
             MeasurementError: a cell without a finite number, or with one above LARGEST_VALUE.
         """
-        if (arrays := self.parse(block, frozenset(column.index for column in wanted.values()))) is not None:
+        if (arrays := self.parse(chunk, frozenset(column.index for column in wanted.values()))) is not None:
             values = {role: column.scale * arrays[column.index] for role, column in wanted.items()}
             extremes = [(x.min(initial=0.0), x.max(initial=0.0)) for x in values.values()]
             if all(low >= -LARGEST_VALUE and high <= LARGEST_VALUE for low, high in extremes):  # not if NaN
                 yield values
                 return
-        rows = self.rows(block, left_out)
-        while chunk := list(islice(rows, _CHUNK_ROWS)):
-            yield {role: np.array([self._number(column, *row) for row in chunk]) for role, column in wanted.items()}
+        rows = self.rows(chunk, left_out)
+        while rows_read := list(islice(rows, _CHUNK_ROWS)):
+            yield {role: np.array([self._number(column, *row) for row in rows_read]) for role, column in wanted.items()}
 
     def _number(self, column: Column, line: int, cells: Sequence[str | float]) -> float:
         """Number in the cell of a column, in SI.
