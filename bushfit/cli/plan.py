@@ -31,7 +31,7 @@ _MOST_VALUES = 6
 
 
 def parse_target(text: str) -> tuple[str, float]:
-    """Parse a target such as "stiffness.axial=1 %" into its name and its relative size (0.01)."""
+    """Name and relative half width of the 95 % interval (0.01) of a target such as "stiffness.axial=1 %"."""
     name, equals, size = text.rpartition("=")
     if not equals:
         raise click.BadParameter(f"'{text}' is not NAME=SIZE, such as \"mu=2 %\".", param_hint="'--target'")
@@ -186,7 +186,7 @@ def _percents(rows: Mapping[str, Mapping[str, Any]], keys: Sequence[str]) -> lis
 
 
 def _print_effects(output: Output, document: PlanFile) -> None:
-    """Print the smallest detectable amounts of effects with the plan and with the standard tests."""
+    """Print the smallest parameter value of each effect that the plan, and the standard tests, would detect."""
     amounts_of = document["visible"]
     ranked = sorted(amounts_of.items(), key=lambda row: (row[1]["standard"] or inf) / (row[1]["planned"] or inf))
     printed = ranked if output.verbose else ranked[:_MOST_EFFECTS]
