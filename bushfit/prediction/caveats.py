@@ -102,7 +102,7 @@ def unfitted_warnings(result: Result, direction: Place) -> Iterator[Caveat]:
         direction: direction or specimen of the prediction.
 
     Yields:
-        Warnings.
+        Warnings on the tests that the prediction is made from, the error of the formula, and compressibility.
     """
     fitted = result.measured.directions if result.measured else ()
     if not fitted:
@@ -189,7 +189,7 @@ def extrapolations(result: Result, points: OperatingPoints, subject: str | None 
         subject: beginning of the warnings; None for the name of the direction.
 
     Yields:
-        Warnings.
+        A warning for each quantity outside its range; none for a model without fitted tests.
     """
     if result.measured is None:
         return

@@ -63,7 +63,7 @@ def requested_grid(default: tuple[Array, Array], requested: PredictSettings, pla
         place: direction or specimen.
 
     Returns:
-        Frequencies [Hz] and zero-to-peak amplitudes [m, rad or 1].
+        Frequencies [Hz], (j,), and zero-to-peak amplitudes [m, rad or 1], (k,); the grid has all combinations.
     """
     frequencies = requested.frequencies or default[0]
     amplitudes = getattr(requested, _AMPLITUDE_KEYS[place.motion]) or default[1]

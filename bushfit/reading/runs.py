@@ -67,11 +67,11 @@ def runs_of(
     """
     levels = nominal_amplitudes(amplitude)
     if (levels == amplitude).all() and repeat is None:
-        levels = _by_rank(amplitude, _group_numbers(frequency), fewest_points=2)
+        levels = _levels_by_rank(amplitude, _group_numbers(frequency), fewest_points=2)
     if (levels == amplitude).all():
         falls = np.append(False, (np.diff(amplitude) < 0.0) | (np.diff(frequency) != 0.0))
         run = np.cumsum(falls) if repeat is None else _group_numbers(frequency, repeat)
-        levels = _by_rank(amplitude, run, fewest_points=1)
+        levels = _levels_by_rank(amplitude, run, fewest_points=1)
     repeats_frequency, repeats_level = (float(np.mean(np.diff(values) == 0.0)) for values in (frequency, levels))
     if max(repeats_frequency, repeats_level) < _LEAST_CONSTANT:
         steps = np.diff(frequency)
@@ -119,16 +119,17 @@ def nominal_amplitudes(amplitude: Floats) -> Floats:
     return amplitude
 
 
-def _by_rank(amplitude: Floats, group: NDArray[np.intp], *, fewest_points: int) -> Floats:
-    """Nominal amplitude of each point, (n,), by ranking the levels in each group of points.
-
-    All groups must have equally many levels of equally many points, and levels must not overlap; otherwise, or if there
-    is only one group, the amplitudes are returned unchanged.
+def _levels_by_rank(amplitude: Floats, group: NDArray[np.intp], *, fewest_points: int) -> Floats:
+    """Nominal amplitude of each point: the median over all groups of the levels of equal rank in their group.
 
     Args:
         amplitude: reached amplitude of each point, (n,).
         group: number of the group of each point, (n,): points at one frequency, or a run over the amplitudes.
-        fewest_points: smallest number of points at a level of a group; from 2 on, reached amplitudes form levels.
+        fewest_points: smallest number of points at a level of a group; with 1, each amplitude is a level.
+
+    Returns:
+        Nominal amplitudes, (n,). The reached amplitudes if there is one group, if groups differ in their number of
+        levels or points per level, or if levels overlap.
     """
     rank, shapes, groups = np.empty(amplitude.size, dtype=np.intp), set(), group_rows(group)
     for rows in groups:
