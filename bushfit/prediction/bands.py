@@ -90,7 +90,7 @@ def alternative_models(result: Result, *, rig: bool) -> Iterator[tuple[Result, M
         yield from ((explained, model) for model in ([other.model] if rig else car_models(other.model, twins)))
 
 
-def candidates(result: Result, *, rig: bool = False) -> list[tuple[Result, Model]]:
+def agreeing_models(result: Result, *, rig: bool = False) -> list[tuple[Result, Model]]:
     """List the models that agree with the tests, the fitted model first; a band spans the predictions of all of them.
 
     Args:

@@ -17,7 +17,7 @@ from bushfit.model.sensitivity import force_and_slopes
 from bushfit.prediction.bands import Band, envelope, uncertainty
 from bushfit.prediction.caveats import BEYOND, MARGIN, extrapolations, unfitted_warnings
 from bushfit.prediction.conditions import OperatingPoints, PredictedPlace, rubber_conditions
-from bushfit.prediction.superposed import correction_factor, timed_candidates
+from bushfit.prediction.superposed import correction_factor, models_with_time_law
 from bushfit.reduction.displacement import noise_and_highest_frequency
 from bushfit.units import number
 
@@ -130,7 +130,7 @@ def time_response(
             replace(alternative, model=alternative.model.without(*left_out)) for alternative in result.alternatives
         ),
     )
-    models, untimed = timed_candidates(timed, str(place), rig=rig)
+    models, untimed = models_with_time_law(timed, str(place), rig=rig)
     force = envelope([_force(source, model, place, history, conditions) for source, model in models])
     unit_strain, tested = result.model.unit_strain(place), _tested_strains(result)
     response = TimeResponse(place, history, force, unit_strain, tested, conditions=conditions)

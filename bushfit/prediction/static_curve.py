@@ -16,7 +16,7 @@ from bushfit.model.sensitivity import force_and_slopes
 from bushfit.prediction.bands import Band, envelope, uncertainty
 from bushfit.prediction.caveats import extrapolations
 from bushfit.prediction.conditions import OperatingPoints, PredictedPlace, rubber_conditions
-from bushfit.prediction.superposed import correction_factor, timed_candidates
+from bushfit.prediction.superposed import correction_factor, models_with_time_law
 from bushfit.reading.preload import Preload
 from bushfit.units import number
 
@@ -113,7 +113,7 @@ def static_curve(
     Raises:
         ModelError: an effect of the model has no law in time, or the preload is outside the tested range.
     """
-    models, untimed = timed_candidates(result, f"{place}, static curve")
+    models, untimed = models_with_time_law(result, f"{place}, static curve")
     displacement = np.linspace(-reach, reach, _POINTS)
     conditions = rubber_conditions(result, place, temperature, preload)
     parts = [_forces(source, model, place, displacement, rate, conditions) for source, model in models]

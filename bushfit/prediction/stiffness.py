@@ -22,7 +22,7 @@ from bushfit.geometry import Place
 from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.model.sensitivity import stiffness_and_slopes
-from bushfit.prediction.bands import Band, candidates, envelope, uncertainty
+from bushfit.prediction.bands import Band, agreeing_models, envelope, uncertainty
 from bushfit.prediction.caveats import (
     MARGIN,
     agrees_within_noise,
@@ -32,7 +32,7 @@ from bushfit.prediction.caveats import (
     unfitted_warnings,
 )
 from bushfit.prediction.conditions import OperatingPoints, PredictedPlace, rubber_conditions
-from bushfit.prediction.superposed import LargeMotion, superposed_stiffness_and_slopes, timed_candidates
+from bushfit.prediction.superposed import LargeMotion, models_with_time_law, superposed_stiffness_and_slopes
 from bushfit.reading.preload import Preload
 from bushfit.reading.runs import nominal_amplitudes
 from bushfit.units import number
@@ -132,13 +132,13 @@ def predict(
     conditions = rubber_conditions(result, direction, temperature, preload)
     points = OperatingPoints(direction, frequency, amplitude, conditions)
     if over:
-        models, untimed = timed_candidates(result, f"{direction}, with the large motion", rig=rig)
+        models, untimed = models_with_time_law(result, f"{direction}, with the large motion", rig=rig)
         over.check_superposable(direction, frequency)
         both = np.array([over.frequency or frequency.min()]), np.array([abs(over.displacement) + amplitude.max()])
         subject = f"{direction}, with the large motion"
         together = extrapolations(result, OperatingPoints(direction, *both, conditions), subject)
     else:
-        models, untimed, together = candidates(result, rig=rig), [], iter(())
+        models, untimed, together = agreeing_models(result, rig=rig), [], iter(())
     predictions = [predict_with_model(source, model, points, over) for source, model in models]
     bands: dict[str, Any] = {
         name: envelope([getattr(prediction, name) for prediction in predictions]) for name in _BANDS

@@ -15,7 +15,7 @@ from bushfit.geometry import Place
 from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.model.sensitivity import force_and_slopes
-from bushfit.prediction.bands import candidates
+from bushfit.prediction.bands import agreeing_models
 from bushfit.prediction.conditions import OperatingPoints
 from bushfit.units import format_range, number
 
@@ -133,7 +133,7 @@ def untimed_effects(model: Model) -> list[str]:
     return model.without(Level.INSTRUMENT, UNNAMED).without_time_law
 
 
-def timed_candidates(
+def models_with_time_law(
     result: Result, subject: str, *, rig: bool = False
 ) -> tuple[list[tuple[Result, Model]], list[Caveat]]:
     """List the models that agree with the tests and have laws in time: the fitted model, then its alternatives.
@@ -151,7 +151,7 @@ def timed_candidates(
         ModelError: an effect of the fitted model has no law in time.
     """
     result.model.without(Level.INSTRUMENT, UNNAMED).require_time_law()
-    models = candidates(result, rig=rig)
+    models = agreeing_models(result, rig=rig)
     untimed = sorted({name for _, model in models for name in untimed_effects(model)})
     sentence = f"the band excludes the alternative with {' or '.join(untimed)}, which has no law in time"
     warnings = [Caveat("alternative_without_law", sentence).about(subject)] if untimed else []
