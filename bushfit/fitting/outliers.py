@@ -240,16 +240,23 @@ def _difference_from_repeats(values: Array, point_index: Array) -> tuple[Array, 
 
 
 def least_absolute(basis: Array, values: Array, smallest: float) -> Array:
-    """Fit a curve with the least sum of absolute distances, robust against outliers; return coefficients, (k, m).
+    """Fit a curve with the least sum of absolute distances, robust against outliers.
 
     Args:
-        basis: values of k functions at the points, (n, k).
+        basis: values of k independent functions at the points, (n, k).
         values: values to fit, m per point, (n, m).
         smallest: distance, in the unit of `values`, below which points do not gain weight.
+
+    Returns:
+        Coefficients of the functions, (k, m).
+
+    Notes:
+        Least squares, reweighted by the reciprocal distances, by the normal equations.
     """
-    root_weight = np.ones((len(values), 1))
+    weight = np.ones((len(values), 1))
     for _ in range(25):  # chosen: nine of ten curves have then come within a third of the noise of where they end
-        solution = np.linalg.lstsq(basis * root_weight, values * root_weight, rcond=None)[0]
-        distance = np.linalg.norm(values - basis @ solution, axis=1, keepdims=True)
-        root_weight = np.sqrt(1.0 / np.maximum(distance, _LEAST_DISTANCE * np.median(distance) + smallest))
+        weighted = (basis * weight).T
+        solution = np.linalg.solve(weighted @ basis, weighted @ values)
+        distance = np.sqrt(np.square(values - basis @ solution).sum(axis=1, keepdims=True))
+        weight = 1.0 / np.maximum(distance, _LEAST_DISTANCE * median(distance) + smallest)
     return np.asarray(solution)

@@ -67,19 +67,23 @@ def to_bytes(name: str, table: pd.DataFrame, form: Form) -> bytes:
 
 
 def to_csv(table: pd.DataFrame, *, decimal_comma: bool = False) -> bytes:
-    """Return a table as the bytes of a CSV file, in which None and NaN are empty cells.
+    """Encode a table as a CSV file, in which None and NaN are empty cells.
 
-    With `decimal_comma`, the file has semicolons, decimal commas and a byte order mark.
+    Args:
+        table: table to encode.
+        decimal_comma: True for semicolons, decimal commas and a byte order mark.
+
+    Returns:
+        Bytes of the file.
     """
-    text, point, delimiter, encoding = io.StringIO(), ".", ",", "utf-8"
-    if decimal_comma:
-        point, delimiter, encoding = ",", ";", "utf-8-sig"
+    point, delimiter, encoding = (",", ";", "utf-8-sig") if decimal_comma else (".", ",", "utf-8")
+    text = io.TextIOWrapper(io.BytesIO(), encoding, "replace", newline="")
     writer = csv.writer(text, delimiter=delimiter, lineterminator="\n")
     writer.writerow([escape_formula(str(header)) for header in table.columns])
     for start in range(0, len(table), _ROWS_AT_ONCE):
         part = table.iloc[start : start + _ROWS_AT_ONCE]
         writer.writerows(zip(*(_texts(column, point) for _, column in part.items()), strict=True))
-    return text.getvalue().encode(encoding, "replace")
+    return text.detach().getvalue()
 
 
 def _texts(column: pd.Series[Any], point: str) -> list[str]:
@@ -88,13 +92,13 @@ def _texts(column: pd.Series[Any], point: str) -> list[str]:
         texts = ["" if value != value else f"{value:z.7g}" for value in column.tolist()]
         return texts if point == "." else [text.replace(".", point) for text in texts]
 
-    def cell_text(value: object) -> str:
-        """Text of a cell that may be a number or a text."""
-        if isinstance(value, float):
-            return f"{value:z.7g}".replace(".", point)
-        return escape_formula(value) if isinstance(value, str) else str(value)
+    def number_text(value: object) -> str:
+        """Text of a cell that is not a text."""
+        if value is None or value != value:
+            return ""
+        return f"{value:z.7g}".replace(".", point) if isinstance(value, float) else str(value)
 
-    return ["" if value is None or value != value else cell_text(value) for value in column.tolist()]
+    return [escape_formula(value) if isinstance(value, str) else number_text(value) for value in column.tolist()]
 
 
 @lru_cache(maxsize=4096)
