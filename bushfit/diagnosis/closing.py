@@ -260,7 +260,7 @@ def _fit_certain(
 
 
 def with_free_gains(fit: FitResult, data: PreparedCampaign) -> FitResult:
-    """Refit a model without the gain error of loops that bushfit assumes if the campaign states none."""
+    """Refit a model without the gain error of loops that bushfit assumes; keep the fit if the campaign states one."""
     gain_is_stated = data.campaign.rig.stiffness_errors[0] is not None
     if gain_is_stated or not any(loop.gain_weighs for loop in split_by_kind(fit.data_sets)[0]):
         return fit

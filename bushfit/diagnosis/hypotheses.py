@@ -278,7 +278,7 @@ class SearchState:
 
     @cached_property
     def _likely_cases(self) -> Array:
-        """Indices of the noise cases (sizes of the rig's errors) with a high evidence, alone or with a smooth curve."""
+        """Indices of the c noise cases (sizes of the errors of rig and rubber) with a high evidence, (c,)."""
         return self.linear.likely_cases(self.columns.curves, _NEAR)
 
     def extended(self, evidence: Evidence, last: Explanation | None = None, log_odds: float = 0.0) -> list[Hypothesis]:

@@ -74,8 +74,8 @@ class Projection:
             signatures: residual changes per unit amount of several explanations, in blocks that act together.
 
         Yields:
-            For each batch of blocks of equal width: the batch; U^T P r, (c, blocks, width); and U^T P U, (c, blocks,
-            width, width).
+            For each batch of blocks (sets of `width` columns that act together): the batch; U^T P r, (c, blocks,
+            width); and U^T P U, (c, blocks, width, width).
         """
         used, index = np.unique(self.rows.rig.combinations[1][self.cases], return_inverse=True)
         (modes, spread), (root, scale) = self.modes, self.root
@@ -120,7 +120,7 @@ class LinearModel:
 
     @cached_property
     def cases(self) -> Array:
-        """Indices of the noise cases (assumed sizes of the errors of rig and rubber) that apply to this model."""
+        """Indices of the c noise cases (assumed sizes of the errors of rig and rubber) that apply here, (c,)."""
         return np.flatnonzero((self.rig.deviation == 0.0) | (self.compound is not None))
 
     def project(self, cases: Array) -> Projection:

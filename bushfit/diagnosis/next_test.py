@@ -197,7 +197,7 @@ def _chi_squares(test: NextTest, models: Sequence[Model], place: Place, frequenc
 
 
 def _finite_log(stiffness: Array) -> Array:
-    """Natural log of a complex stiffness, finite even where a model has no stiffness."""
+    """Natural log of complex stiffnesses, (n,), finite even where a model has no stiffness."""
     return np.log(stiffness + np.finfo(float).tiny)
 
 

@@ -93,7 +93,7 @@ class CompoundDeviation:
 
     @cached_property
     def rows(self) -> RigRows:
-        """The q changes of the residuals, (q, n)."""
+        """Change of the residuals by each of the q patterns of the deviation, (q, n)."""
         return RigRows(self.signature.whole, self.rig)
 
     @cached_property
@@ -197,9 +197,10 @@ class SignatureSet:
 
     @cached_property
     def _products_within(self) -> list[Array]:
-        """Inner products of the columns of each block, weighted by the random noise only, one array for each batch.
+        """Inner products U^T N^-1 U of the columns U of each block, with the variances N of the random noise.
 
-        Each array is (sizes, blocks, width, width): for each assumed size of the random noise.
+        Returns:
+            One array for each batch, (sizes, blocks, width, width), for each assumed size of the random noise.
         """
         by_batch = []
         for batch in self.batches:

@@ -103,7 +103,7 @@ class ExplanationColumns:
 
     @cached_property
     def compound(self) -> CompoundDeviation | None:
-        """Smooth deviation of the rubber beside the errors of the rig; None if the tests cannot show any."""
+        """Smooth deviation of the rubber, as modes that are independent given the rig's errors; None without tests."""
         return CompoundDeviation(self.tests.deviation, self.errors) if self.tests.deviation else None
 
     @cached_property

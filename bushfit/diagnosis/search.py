@@ -149,7 +149,7 @@ class Search:
                     beam.append(state)  # tests with a mistake and an effect are explained by neither alone
             if not beam:
                 break
-        for linear in self._settle_linear():
+        for linear in self._unrefitted_hypotheses():
             assert isinstance(linear.last, Proposal)  # all else needs no refit
             if not self._with_effects(linear.state, [linear.last]):
                 del self._known[linear.key]  # no response with it, or far behind
@@ -175,7 +175,7 @@ class Search:
         is_power_law = best.last is not None and best.last.family == POWER_LAW and len(best.key) == 1
         return is_power_law and finding.reported[0].probability >= NAMED and best.p_value >= DOES_NOT_FIT
 
-    def _settle_linear(self) -> Iterator[Hypothesis]:
+    def _unrefitted_hypotheses(self) -> Iterator[Hypothesis]:
         """Yield for a refit, one by one, the most probable hypotheses whose evidence is from the linear model."""
         for _ in range(_SETTLED):
             ordered = self._ordered_hypotheses()

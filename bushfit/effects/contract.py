@@ -106,7 +106,7 @@ class Parameter:
     scale: Literal["period", "frequency", "displacement", "strain", "force", "order", "session"] | None = None
 
     def value_at_share(self, share: float) -> float:
-        """Value whose distance from the neutral value (0 if None) is a share of the typical distance."""
+        """Neutral value (0 if None) plus a share of the typical distance from it, in the parameter's SI unit."""
         return (self.neutral or 0.0) + share * self.typical
 
     def reached_bound(self, value: float) -> Literal["min", "max"] | None:

@@ -20,7 +20,7 @@ _PLACES = (2.0 * np.arange(_COUNT) + 1.0) / _COUNT - 1.0
 
 
 def _ends(p: Values) -> tuple[Array, Array]:
-    """Smallest and largest slip strain of the sliders [1]: e_s/exp(spread) and e_s exp(spread)."""
+    """Smallest and largest slip strain of the sliders [1]: e_s/exp(spread) and e_s exp(spread), of any shape."""
     middle, factor = np.atleast_1d(p["e_s"]), np.exp(np.asarray(p["spread"]))
     return middle / factor, middle * factor
 

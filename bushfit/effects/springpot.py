@@ -9,7 +9,7 @@ from bushfit.effects.contract import Array, History, Value, Values
 
 
 def power_of_rate(alpha: Array, omega: Array) -> Array:
-    """Compute (i omega)^alpha, the transfer function of a fractional derivative of order alpha at omega [rad/s]."""
+    """Transfer function (i omega)^alpha of a fractional derivative of order alpha, at omega [rad/s], (..., n)."""
     return np.power(omega, alpha) * np.exp(0.5j * np.pi * alpha)
 
 
@@ -64,7 +64,7 @@ def fractional_derivative(alpha: Value, history: History) -> Array:
 
 @lru_cache(maxsize=8)
 def _weight_spectrum(alpha: float, count: int, length: int) -> Array:
-    """Fourier transform (numpy.fft.rfft) of the weights w_0 = 1, w_j = w_{j-1} (j - 1 - alpha)/j of Eq. 3.
+    """Fourier transform (numpy.fft.rfft) of the Gruenwald-Letnikov weights w_0 = 1, w_j = w_{j-1} (j - 1 - alpha)/j.
 
     Args:
         alpha: order of the derivative.

@@ -38,7 +38,7 @@ class Coordinates:
 
     @classmethod
     def of_parameters(cls, model: Model, names: Sequence[str]) -> "Coordinates":
-        """Build the map for some parameters of a model, given by name."""
+        """Build the map between values and coordinates of some parameters of a model, given by name."""
         return cls(tuple(names), tuple(model.parameters[name] for name in names))
 
     def forward(self, name: str, value: float) -> float:

@@ -211,7 +211,7 @@ class Discrepancy:
 
     @cached_property
     def columns(self) -> Array:
-        """Changes of the d components of the residuals by each complex shape of the process, (2 q, d)."""
+        """Changes of the residuals, reduced to d components, by the q patterns in phase and in quadrature, (2 q, d)."""
         return self.tests.residual_changes(self.complex_shapes, reduced=True)
 
     @cached_property

@@ -254,7 +254,7 @@ class MeasuredLoop(MeasuredBase):
         return self.faulty_rows["force"].rows
 
     def outliers(self, points: Array, model: Model) -> Iterator[Outlier]:
-        """Yield all rows that are far from the loop's harmonics, with their distance in units of noise.
+        """Yield file, row and distance [units of noise] of all rows that are far from the loop's harmonics.
 
         Args:
             points: not used for a loop; for a sweep, indices of the outliers.

@@ -272,7 +272,7 @@ class MeasuredSweep(MeasuredBase):
 
     @cached_property
     def unit_model_error(self) -> SharedErrors:
-        """Model error of 100 % of |K| (standard deviation) in phase and in quadrature; repeats of a point share it."""
+        """Error of the model of 100 % of |K| in phase and in quadrature, shared by repeats of a point, to be scaled."""
         points = np.unique(self.frequency + 1j * self.amplitude, return_inverse=True)[1]
         return SharedErrors.of_groups(points, self.per_noise, (1.0, 1.0))
 

@@ -139,8 +139,8 @@ def outlying_points(
     Args:
         deviation: deviation of each point from the model, relative gain + i phase [rad], complex (n,).
         normalised: function from deviations to gain and phase in units of noise, (2, n); with `shared=False` the errors
-            shared by a block are not subtracted.
-        starts: index of the first point of each block (run).
+            shared by a run are not subtracted.
+        starts: index of the first point of each run.
         points: frequency and amplitude of each point, (2, n); points with equal values are repeats.
         freedom: degrees of freedom behind the noise; inf if the noise is known.
 

@@ -66,13 +66,13 @@ class SharedErrors:
         return cls(directions, deviation)
 
     def whiten(self, rows: Array) -> Array:
-        """Multiply residuals or derivatives in units of noise, (..., n), by S^(-1/2), to remove correlation."""
+        """Whiten residuals or derivatives in units of noise, (..., n): multiply by S^(-1/2) with their covariance S."""
         if not self.deviations.any():
             return rows
         return rows - self.multiply(rows, 1.0 - 1.0 / np.hypot(1.0, self.deviations))
 
     def multiply(self, rows: Array, factors: Array) -> Array:
-        """Project rows, (..., n), on the directions and multiply each of the r components by a factor, (r,).
+        """Multiply the components of residuals, (..., n), along the r directions by factors, (r,), and drop the rest.
 
         Returns:
             Sum of the multiplied components, (..., n).

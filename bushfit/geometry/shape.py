@@ -34,8 +34,8 @@ class Correction(NamedTuple):
     """Correction factors of the radial formulas for one shape of a tube, from finite elements.
 
     Args:
-        stiffness: radial stiffness over the stiffness of Eqs. 11 and 12.
-        strain: equivalent strain over the strain of Eq. 8. At this strain the friction branch equals its average over
+        stiffness: radial stiffness over that of Garcia Tarrago et al. 2007, Eqs. 11 and 12.
+        strain: equivalent strain over that of their Eq. 8. At this strain the friction branch equals its average over
             the uneven strain field, for strain amplitudes from 0.3 to 3 times that of half the friction (eps_half).
         softening: relative increase of the radial compliance per ratio of shear modulus to bulk modulus.
     """

@@ -22,7 +22,9 @@ _LARGEST_Q_OF_SERIES = 0.5
 
 
 def axial_strain(a: float, b: float) -> float:
-    """Equivalent axial strain per displacement [1/m], e/d = 1 / sqrt(2 (b^2 - a^2) ln(b/a)) (Eq. 7), radii a < b [m].
+    """Equivalent axial strain per displacement [1/m] for radii a < b [m] (Garcia Tarrago et al. 2007, Eq. 7).
+
+    Notes: e/d = 1 / sqrt(2 (b^2 - a^2) ln(b/a)).
 
     >>> round(axial_strain(0.010, 0.018), 2)
     61.62
@@ -31,7 +33,7 @@ def axial_strain(a: float, b: float) -> float:
 
 
 def axial_stiffness(a: float, b: float, length: float) -> float:
-    """Compute the axial stiffness per shear modulus, k/mu = 2 pi L / ln(b/a) (Eq. 10).
+    """Compute the axial stiffness per shear modulus, k/mu = 2 pi L / ln(b/a) (Garcia Tarrago et al. 2007, Eq. 10).
 
     Args:
         a, b: inner and outer radius [m].
@@ -48,7 +50,7 @@ def axial_stiffness(a: float, b: float, length: float) -> float:
 
 @lru_cache(maxsize=256)  # a fit asks for those of one bushing thousands of times
 def radial_strain(a: float, b: float) -> float:
-    """Equivalent radial strain per displacement [1/m] for radii a < b [m] (Eq. 8).
+    """Equivalent radial strain per displacement [1/m] for radii a < b [m] (Garcia Tarrago et al. 2007, Eq. 8).
 
     Notes: e/d = sqrt((a^2 + b^2) / ((b^4 - a^4) ln(b/a) - (a^2 - b^2)^2)). With q = (b^2 - a^2)/(b^2 + a^2), this
     equals 1 / sqrt((b^2 - a^2) (ln(b/a) - q)). If ln(b/a) and q cancel, the difference is summed as
@@ -65,7 +67,7 @@ def radial_strain(a: float, b: float) -> float:
 
 @lru_cache(maxsize=256)
 def radial_stiffness(a: float, b: float, length: float) -> float:
-    """Compute the radial stiffness per shear modulus (Eqs. 11 and 12).
+    """Compute the radial stiffness per shear modulus (Garcia Tarrago et al. 2007, Eqs. 11 and 12).
 
     Args:
         a, b: inner and outer radius [m].

@@ -288,8 +288,8 @@ class Model:
             Complex stiffness, in the common shape of frequency and amplitude.
 
         Notes:
-            The rubber has k = G mu^(omega, e0), with G of Eqs. 10, 11, 12 and e0 of Eqs. 7, 8 (Eqs. 6 to 12); the
-            layers of the model are applied to it.
+            The rubber has k = G mu^(omega, e0) with G of Eqs. 10 to 12 and e0 of Eqs. 7 and 8 of Garcia Tarrago et al.
+            2007; the layers of the model are applied to it.
 
         >>> k = paper.stiffness("axial", 100.0, 1e-4)
         >>> print(f"{abs(k) / 1e3:.1f} N/mm, loss factor {k.imag / k.real:.3f}")

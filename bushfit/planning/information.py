@@ -47,7 +47,7 @@ class Information(NamedTuple):
     squares: Array
 
     def noncentralities(self) -> Array:
-        """Expected increase of chi-square by each departure, after a refit of the model to the tests, (choices, e)."""
+        """Expected increase of chi-square by each of e missing effects or rivals after a refit, (choices, e)."""
         fitted = np.linalg.solve(self.parameters, self.cross)
         return np.maximum(self.squares - np.sum(self.cross * fitted, axis=-2), 0.0)
 
@@ -97,19 +97,25 @@ class ModelInformation:
         return Information(remaining[..., :k], remaining[..., k:], self.squares * counts[:, None] - decrease)
 
     def total(self, counts: Array) -> Information:
-        """Fisher information of the prior and all runs together (one set of tests).
+        """Fisher information of the prior and all runs together.
 
         Args:
             counts: number of runs of each candidate test, (tests,).
+
+        Returns:
+            Information with one entry (choice).
         """
         parameters, cross, squares = (part.sum(axis=0, keepdims=True) for part in self.of_runs(counts))
         return Information(parameters + self.prior, cross, squares)
 
     def with_one_more(self, counts: Array) -> Information:
-        """Fisher information of the prior and all runs if one test is run once more; one choice for each test.
+        """Fisher information of the prior and all runs, with one more run of each test in turn.
 
         Args:
             counts: number of runs of each test before this run, (tests,).
+
+        Returns:
+            Information with one entry (choice) for each test that is run once more.
         """
         total, now, more = self.total(counts), self.of_runs(counts), self.of_runs(counts + 1)
         return Information(

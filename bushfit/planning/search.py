@@ -134,11 +134,11 @@ class PlanSearch:
         return order
 
     def objective(self, counts: Array) -> float:
-        """Objective that the plan minimises, for `counts` runs of each test, (tests,)."""
+        """Objective that the plan minimises (see `objectives`) for `counts` runs of each test, (tests,)."""
         return float(self.objectives([model.total(counts) for model in self.models])[0])
 
     def objectives_with_one_more(self, counts: Array) -> Array:
-        """Objective with one run of each test in turn added to `counts`, (tests,)."""
+        """Objective (see `objectives`) with one run of each test in turn added to `counts`, (tests,)."""
         return self.objectives([model.with_one_more(counts) for model in self.models])
 
     def objectives(self, informations: Sequence[Information]) -> Array:

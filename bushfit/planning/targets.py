@@ -98,7 +98,11 @@ class PlannedQuantity:
         return np.square(self.scale) * np.einsum("nk,kl,nl->n", self.rows, error_covariance, self.rows)
 
     def rms_error(self, error_covariance: Array) -> float:
-        """Root mean square of the standard errors, in the unit of `value`, from the parameters' covariance, (k, k)."""
+        """Root mean square over points of the reported standard errors, `value` times the relative errors.
+
+        Args:
+            error_covariance: covariance of the parameters' relative errors, (k, k).
+        """
         variances = self.variances(error_covariance) + self.model_error**2
         return float(np.sqrt(np.mean(np.square(self.value) * variances)))
 

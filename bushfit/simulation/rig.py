@@ -104,7 +104,7 @@ def simulate_motion(
 
 
 def lock_in(measured: Loop, frequency: float) -> complex:
-    """Complex dynamic stiffness [N/m or N m/rad] of a record, from the first harmonic at a frequency [Hz] (Eq. 9)."""
+    """Complex dynamic stiffness [N/m or N m/rad] of a record, from its first harmonics at a frequency [Hz]."""
     channels = np.column_stack((measured.displacement, measured.force))
     _, (displacement, force), _ = cycle_harmonics(measured.time * frequency, channels, 1)
     return complex(force / displacement)
