@@ -91,7 +91,7 @@ class RigErrors:
 
     @cached_property
     def is_plain(self) -> Array:
-        """Mask of the noise cases with rig errors within the stated accuracy and an exact model of the rubber, (cases,)."""
+        """Mask of the noise cases with rig errors within the stated accuracy and no rubber deviation, (cases,)."""
         return np.array([not case.wide and case.compound == 0.0 for case in self.cases])
 
     @cached_property
