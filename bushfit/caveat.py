@@ -56,6 +56,16 @@ class Caveat:
         return replace(self, text=f"{subject}: {self.text}", subject=str(subject))
 
 
+def join_names(names: Iterable[object], word: str = "and") -> str:
+    """Join names for a sentence, as in "a, b and c", with the given word before the last.
+
+    >>> join_names(["mu", "m", "alpha"], "or")
+    'mu, m or alpha'
+    """
+    words = [*map(str, names)]
+    return f" {word} ".join(filter(None, (", ".join(words[:-1]), *words[-1:])))
+
+
 class WarningEntries(TypedDict):
     """Warnings as entries of a JSON document.
 

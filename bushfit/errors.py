@@ -160,6 +160,6 @@ def unknown_name(
     return kind(problem, place=place, found=name, expected=expected, hint=did_you_mean(name, names))
 
 
-def quote_path(path: Path) -> str:
-    """Format a path for a terminal: in quotes if it contains characters that a shell would interpret."""
+def quote_path(path: Path | str) -> str:
+    """Format a path, or another word, for a terminal: in quotes if it has characters that a shell would interpret."""
     return f'"{path}"' if _SHELL_CHARACTERS.search(str(path)) else str(path)

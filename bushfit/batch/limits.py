@@ -49,7 +49,7 @@ RESULTS: Sequence[LimitResult] = ("pass", "conditional pass", "not judged", "con
 #: with `nrmse`. Chosen: half of the usual tolerance of a stiffness in drawings.
 POOR_FIT = 0.05
 #: Reduced chi-square from which noise alone does not explain a misfit.
-_BEYOND_NOISE = 2.0
+BEYOND_NOISE = 2.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -238,7 +238,7 @@ def describe_poor_fit(record: RowFile, limits: Limits | None) -> str:
     """Sentence on a poor fit: NRMSE above its limit (default 5 %) and reduced chi-square of 2 or more; else empty."""
     nrmse, chi_square = (record.quantities.get(quantity.name) for quantity in FIT_QUALITY.values())
     largest = POOR_FIT if limits is None or limits.nrmse is None else limits.nrmse
-    if not nrmse or nrmse.value <= largest or (chi_square and chi_square.value < _BEYOND_NOISE):
+    if not nrmse or nrmse.value <= largest or (chi_square and chi_square.value < BEYOND_NOISE):
         return ""
     return f"the model misses the tests: NRMSE {number(100 * nrmse.value, 3)} %, above {number(100 * largest, 3)} %"
 
@@ -323,5 +323,5 @@ def limit_sentence(
     if finite:
         nearest = min(finite, key=lambda limit: abs(limit - estimate.value))
         sentence += f", limit {number(nearest * displayed.factor, 4)}{unit}"
-    sentence += f", at the {bound} bound of the fit" if bound else ""
+    sentence += f", not determined ({bound} bound of the fit)" if bound else ""
     return sentence + (f": {result}" if result.startswith("conditional") else "")

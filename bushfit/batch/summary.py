@@ -14,9 +14,17 @@ import numpy as np
 
 from bushfit.batch.comparison import FEWEST, capability, find_outliers, smallest_deviation, usual_parts
 from bushfit.batch.document import Estimate, RowFile
-from bushfit.batch.limits import Limits, describe_poor_fit, judge_part, resolve_limits
+from bushfit.batch.limits import BEYOND_NOISE, Limits, describe_poor_fit, judge_part, resolve_limits
 from bushfit.batch.manifest import Row
-from bushfit.batch.quantities import FIT_NAMES, STIFFNESS, PartQuantity, list_quantities, parse_point, point_quantity
+from bushfit.batch.quantities import (
+    FIT_NAMES,
+    FIT_QUALITY,
+    STIFFNESS,
+    PartQuantity,
+    list_quantities,
+    parse_point,
+    point_quantity,
+)
 from bushfit.batch.row import RowTask
 from bushfit.batch.store import ROWS_FOLDER
 from bushfit.caveat import Caveat, to_entries
@@ -27,7 +35,7 @@ from bushfit.model.covariance import Z95
 from bushfit.reduction.arrays import median_and_scatter
 from bushfit.report.batch_document import BatchFile, PartTable, QuantityTable
 from bushfit.report.results import Formats
-from bushfit.units import number
+from bushfit.units import format_range, number
 from bushfit.validation import to_json_data
 
 if TYPE_CHECKING:
@@ -308,9 +316,15 @@ class BatchResult:
             for part, record in zip(parts, self.records, strict=True)
             if not (part.poor_fit or record.verdict or _MISFITS.isdisjoint(part.warning_kinds))
         ]
-        if missing:
+        chi_square = self.estimates[FIT_QUALITY["reduced_chi_square"].name][0]
+        if len(parts) > 1 and np.all(chi_square >= BEYOND_NOISE):
+            ends = format_range("", chi_square.min(), chi_square.max()).strip()
+            sentence = f"the model misses the tests of all {len(parts)} parts (reduced chi-square {ends})"
+            advice = "look for a common cause, an effect or a mistake in the record: diagnose one part"
+            warnings.append(Caveat("part_misfit", f"{sentence}: {advice}"))
+        elif missing:
             sentence = f"the tests of {listed(missing)} deviate from the model by more than noise explains"
-            warnings.append(Caveat("part_misfit", f"{sentence}: bushfit batch --command diagnose looks for the cause"))
+            warnings.append(Caveat("part_misfit", f"{sentence}: --command diagnose looks for the cause"))
         if lacking := [part.name for part, lacks in zip(parts, self.lacks_sweep, strict=True) if lacks]:
             sentence = f"no sweep, unlike the other parts, and so not compared with them: {listed(lacking)}"
             warnings.append(Caveat("part_without_sweep", sentence))

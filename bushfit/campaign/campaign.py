@@ -152,7 +152,7 @@ def _read_file(path: Path) -> CampaignFile:
                 register_file(Path(os.path.normpath(path.parent / law)))
     match tables:
         case {"bushings": [{"campaign": _}, *_]}:
-            hint = f"bushfit batch {quote_path(path)} evaluates the list"
+            hint = f"to evaluate the list: bushfit batch {quote_path(path)}"
             raise CampaignError("a campaign is needed", file=path, found="a list of campaigns", hint=hint)
     return validate_tables(tables, path, CampaignFile)
 
@@ -255,9 +255,10 @@ def refuse_tests(paths: Sequence[Path]) -> None:
     if tests:
         found = "a folder" if tests[0].is_dir() else "a test file" if len(tests) == 1 else "test files"
         sizes = '--inner-radius "10 mm" --outer-radius "18 mm" --length "34 mm"'
-        hint = f"bushfit init {' '.join(map(quote_path, tests))} {sizes} writes one, with the dimensions of your rubber"
+        command = f"bushfit init {' '.join(map(quote_path, tests))} {sizes}"
+        hint = f"to write one, with the dimensions of your rubber: {command}"
     else:
-        found, hint = "a model", f"bushfit predict {quote_path(first)} predicts from a model"
+        found, hint = "a model", f"to predict from a model: bushfit predict {quote_path(first)}"
     raise CampaignError("a campaign is needed", file=(tests or paths)[0], found=found, expected=expected, hint=hint)
 
 

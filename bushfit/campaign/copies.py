@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from bushfit.caveat import Caveat
+from bushfit.caveat import Caveat, join_names
 from bushfit.reading.measurement import AnyTest, Loop, Source, Sweep
 
 #: Minimum number of identical points that are copies; chosen: fewer may agree by chance in rounded files.
@@ -89,7 +89,7 @@ def without_copied_points(sweeps: Sequence[Sweep]) -> list[Sweep]:
         notes = [_copy_note(sweep, [sweeps[copy] for copy, first in copies if first == index and is_copy[copy].all()])]
         for (_, original), rows in ((pair, rows) for pair, rows in copies.items() if pair[0] == index):
             repeats = [*map(str, sorted(set(sweep.repeat[rows].tolist())))]
-            of_repeats = f" of repeat{'s' * (len(repeats) > 1)} {_join_names(repeats)}" if original == index else ""
+            of_repeats = f" of repeat{'s' * (len(repeats) > 1)} {join_names(repeats)}" if original == index else ""
             source = "an earlier repeat" if original == index else sweeps[original].name
             sentence = f"{len(rows)} points{of_repeats} are exact copies of {source} and are left out; "
             sentence += "row numbers in messages do not count the copies"
@@ -108,15 +108,10 @@ def _copy_note(first: AnyTest, copies: Sequence[AnyTest]) -> Caveat | None:
     """Note that names the files (or, within one file, the tests) with copies of a test; None without copies."""
     file = first.source.file if first.source else None
     names = [copy.source.file.name if copy.source and copy.source.file != file else copy.name for copy in copies]
-    return Caveat("copied_tests", f"{_join_names(names)} with the same data: used once") if names else None
+    return Caveat("copied_tests", f"{join_names(names)} with the same data: used once") if names else None
 
 
 def _with_note(test: AnyTest, note: Caveat | None) -> AnyTest:
     """Add a warning, if any, to the notes on how the file of a test was read."""
     source: Source | None = test.source
     return replace(test, source=source.with_note(note)) if source and note else test
-
-
-def _join_names(names: Sequence[str]) -> str:
-    """Join names as in "a, b and c"."""
-    return " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))

@@ -93,7 +93,8 @@ def _print_comparison(output: Output, name: str, compared: ComparisonOutput) -> 
         verdict, *advice = compared.advice
         best = max(families, key=lambda family: family.probability)
         effects = "" if best is families[0] else "".join(f" --effect {name}" for name in best.name.split("+"))
-        action = f"next: bushfit fit {quote_path(Path(content.compared[0].source))}{effects}"
+        source = content.compared[0]
+        action = f"next: {output.command(f'fit {quote_path(source.source)}{effects}', source.name)}"
         sentences = [*advice, *notes, *(compared.words if output.verbose else ())]
     else:
         differing = zip(labels, (comparison.differing for comparison in compared.comparisons), strict=True)

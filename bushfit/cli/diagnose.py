@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -9,10 +10,12 @@ from typing import TYPE_CHECKING, Any
 import click
 from rich.markup import escape
 
+from bushfit.caveat import join_names
 from bushfit.cli.options import command_called, file_option, option, option_group
 from bushfit.cli.output import Output, with_output
 from bushfit.cli.printing import print_parameters, print_tests, print_validations
 from bushfit.cli.shared_options import campaign_options, exit_above, open_campaign, quantity
+from bushfit.errors import quote_path
 from bushfit.units import number
 
 if TYPE_CHECKING:
@@ -72,35 +75,43 @@ def command(
     folder = output.folder(campaign.name, "diagnosis.json", "model.json")
     diagnosed = diagnose(campaign, model=start, **settings)
     output.warn(diagnosed.data.notes)
-    print_diagnosis(output, diagnosed)
+    print_diagnosis(output, diagnosed, " ".join(map(quote_path, ["bushfit", *sys.argv[1:]])))
     output.write(folder, diagnosed.files, diagnosed.document, input_files(campaign, model))
     exit_above(max_nrmse, diagnosed.result)
 
 
-def print_diagnosis(output: Output, diagnosed: DiagnosisOutput) -> None:
-    """Print a diagnosis: verdict, gap (root mean square residual in units of noise), next test, and details."""
+def print_diagnosis(output: Output, diagnosed: DiagnosisOutput, typed: str) -> None:
+    """Print a diagnosis: verdict, gap (root mean square residual in units of noise), next test, and details.
+
+    Args:
+        output: output of the command.
+        diagnosed: the diagnosis.
+        typed: command that the user typed.
+    """
     from bushfit.effects import BASE
     from bushfit.effects.unnamed import effect_label
 
     diagnosis = diagnosed.diagnosis
-    print_verdict(output, diagnosed)
+    print_verdict(output, diagnosed, typed + " --force" * ("--force" not in typed.split()))
     print_findings(output, diagnosed)
     print_validations(output, diagnosed.validations)
     for effect in diagnosed.document["effects"] if diagnosis.verdict != "ambiguous" else ():
         output.console.print(f"  [bold]why {effect_label(effect['name'])}:[/bold] {escape(effect['evidence'])}")
     print_tests(output, (), diagnosis.result.usable)
-    if output.verbose:
-        title = "candidates: reduction of chi-square (gain) and probability that the effect is missing in the model"
-        fitted = ((candidate, candidate.gain) for candidate in diagnosis.candidates if candidate.gain is not None)
-        rows = ((one.name, one.why, f"{gain:.0f}", f"{one.probability:.2f}") for one, gain in fitted)
-        output.print_table(title, ("candidate", "why", "gain", "probability"), rows, text_columns=2)
     if tuple(diagnosis.result.model.effects) != BASE or output.verbose:
         print_parameters(output, "fitted model", diagnosis.result)
     output.warn(diagnosis.warnings)
 
 
-def print_verdict(output: Output, diagnosed: DiagnosisOutput, action: str = "") -> None:
-    """Print the verdict of a diagnosis, the next step (`action`), a summary, and probabilities of missing effects."""
+def print_verdict(output: Output, diagnosed: DiagnosisOutput, again: str, action: str = "") -> None:
+    """Print the verdict of a diagnosis, the next step, a summary, and probabilities of missing effects.
+
+    Args:
+        output: output of the command.
+        diagnosed: the diagnosis.
+        again: command that repeats the diagnosis, to which effects to adopt are added.
+        action: next step; "" for the permitted use of the numbers.
+    """
     from bushfit.diagnosis.record import format_odds
     from bushfit.report.diagnosed import permitted_use
 
@@ -108,7 +119,10 @@ def print_verdict(output: Output, diagnosed: DiagnosisOutput, action: str = "") 
     output.print_headline(diagnosed.data.campaign.name, diagnosed.headline, action or use, f"bold {colour}")
     lines = [use] if action and colour != "green" else []
     lines += [*diagnosed.diagnosis.summary.split("; "), *format_odds(diagnosed.document)]
-    for line in (*lines, *filter(None, [diagnosed.adopt])):
+    if labels := diagnosed.adoptable:
+        adopted = "".join(f" --adopt {quote_path(label)}" for label in labels)
+        lines.append(f"if tests confirm {join_names(labels)}: {again}{adopted}")
+    for line in lines:
         output.console.print(f"  {escape(line)}")
 
 
@@ -125,6 +139,10 @@ def print_findings(output: Output, diagnosed: DiagnosisOutput) -> None:
                 console.print(f"    {number(region.excess, 2):>5} x noise: {escape(region.reading)}")
     if diagnosis.next_test:
         console.print(f"  [bold]next test:[/bold] {escape(diagnosis.next_test)}")
+    if diagnosed.rivals:
+        campaign = diagnosed.data.campaign
+        plan = output.command(f"plan {quote_path(campaign.path)} --rivals {','.join(diagnosed.rivals)}", campaign.name)
+        output.print(f"  or, with tests of the bushing alone, plan tests that distinguish the causes: {plan}")
 
 
 def _print_gap(output: Output, document: Mapping[str, Any]) -> None:
@@ -143,16 +161,13 @@ def _print_gap(output: Output, document: Mapping[str, Any]) -> None:
 
 
 def _print_effect(output: Output, effect: EffectEntry) -> None:
-    """Print one named effect: description, parameter values, and the correction of a mistake in the record."""
+    """Print one named effect: description, and the correction of a mistake in the record."""
     from bushfit.effects.unnamed import effect_label
-    from bushfit.report.parameters import effect_sizes
 
     console = output.console
     test = f" in {effect['test']}" if effect["test"] else ""
     level = "bushing or rig" if effect["level"] == "unresolved" else effect["level"]
     name = effect_label(effect["name"])
     console.print(f"  [bold]{name}[/bold]{escape(test)} ({level}): {escape(effect['sentence'])}")
-    for parameter, value, interval in effect_sizes(effect):
-        console.print(f"    {parameter} = {value}, {f'95 % {interval}' if interval else 'no interval'}")
     if effect["correction"]:
         console.print(f"    correction in the campaign: {escape(effect['correction'])}")

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from bushfit.caveat import Caveat, to_caveats
+from bushfit.caveat import Caveat, join_names, to_caveats
 from bushfit.cli.options import FILE, command_called, flag, option, option_group
 from bushfit.cli.output import Output, with_output
+from bushfit.cli.printing import permitted_use
 from bushfit.cli.shared_options import prediction_options, quantity, static_rate_option
 
 if TYPE_CHECKING:
@@ -103,6 +104,12 @@ def command(model: Path, formats: tuple[str, ...], campaign: Path | None, output
     for name, entry in document["formats"].items():
         for limit in to_caveats(entry["left_out"], entry["left_out_kinds"]):
             limits.setdefault(limit, []).append(name)
+    warnings = to_caveats(document["warnings"], document["warning_kinds"])
+    errors = sum(limit.kind == "format_error" for limit in limits)
+    verdict = f"written for {join_names(names)}"
+    verdict += f", with {errors} error{'s' * (errors > 1)} of the formats" if errors else ""
+    action = permitted_use([*limits, *warnings], "The files may be used: there are no warnings.")
+    output.print_headline(result.name, verdict, action)
     printed = [limit for limit in limits if output.verbose or limit.kind == "format_error"]
     for limit in printed:
         output.print(f"limit of {', '.join(limits[limit])}: {limit}")
@@ -110,5 +117,5 @@ def command(model: Path, formats: tuple[str, ...], campaign: Path | None, output
         output.print(
             f"{remaining} more limit{'s' * (remaining > 1)} of the formats: -v prints all; the files state them"
         )
-    output.warn(to_caveats(document["warnings"], document["warning_kinds"]))
+    output.warn(warnings)
     output.write(folder, files, document, input_files(loaded, file))

@@ -18,8 +18,10 @@ if TYPE_CHECKING:
     from bushfit.campaign.schema import Loss
     from bushfit.commands.fit import FitOutput
 
+#: Reduced chi-square from which a model misses its tests.
+_BEYOND_NOISE = 2.0
 #: Kinds of warnings that the model misses the tests.
-_MISFITS = {"misfit", "model_error", "given_values_miss"}
+_MISFITS = {"misfit", "model_error", "given_values_miss", "unfitted_test_missed"}
 
 
 @command_called("fit-static", "configs/cmp_15961.toml")
@@ -123,23 +125,26 @@ def _print_and_write(
     """
     campaign, result, file = fitted.data.campaign, fitted.result, quote_path(fitted.data.campaign.path)
     written = quote_path(folder / f"{fitted.files[0].name}.json")
-    verdict, action = "nothing was fitted: the tests are not compared", f"bushfit predict {written}"
+    verdict, aim, words = "nothing was fitted: the tests are not compared", "predict from this model", ""
     by_kind = {warning.kind: warning.text for warning in result.warnings}
     misses = not _MISFITS.isdisjoint(by_kind)
     if quality := result.quality:
+        misses |= quality.reduced_chi_square >= _BEYOND_NOISE
         verdict = f"the model {'misses' if misses else 'meets'} the tests: NRMSE {number(100 * quality.nrmse, 2)} %"
         verdict += f", reduced chi-square {number(quality.reduced_chi_square, 3)} (1 is noise alone)"
         if misses:
             start = f" --model {written}" if {*result.model.effects} - {*fitted.data.effects} else ""
-            action = f"bushfit diagnose {file}{start} finds what the model lacks"
-            action = action if result.fitted else f"free a parameter in [fit] of {file}, and fit again"
+            aim, words = "find what the model lacks", f"diagnose {file}{start}"
+            if not result.fitted:
+                aim, words = f"free a parameter in [fit] of {file}, and fit again", f"fit {file}"
     if fitted.files[0].name == "static":
-        action = f"bushfit fit-dynamic {file} --static {written} fits m and alpha"
+        aim, words = "fit m and alpha", f"fit-dynamic {file} --static {written}"
     elif units := by_kind.get("implausible_modulus"):
-        verdict, action = units, f"bushfit diagnose {file} finds the file with the wrong unit"
+        verdict, aim, words = units, "find the file with the wrong unit", f"diagnose {file}"
     elif not misses and (left_open := result.covariance.describe_unknown(result.model.values)):
-        verdict, action = left_open, f"bushfit plan {file} --hours 1 chooses tests that determine them"
-    output.print_headline(campaign.name, verdict, f"next: {action}")
+        verdict, aim, words = left_open, "choose tests that determine them", f"plan {file} --hours 1"
+    command = output.command(words, campaign.name) if words else output.command(f"predict {written}", result.name)
+    output.print_headline(campaign.name, verdict, f"next, {aim}: {command}")
     for title, step in fitted.steps:
         print_step(output, f"{campaign.name}: {title}", step)
     for table in (part.content() for part in fitted.files if part.name == "bushings"):

@@ -94,6 +94,9 @@ def command(files: tuple[Path, ...], name: str | None, no_input: bool, output: O
         inner, outer, long = (1e3 * size for size in (2 * body.inner_radius, 2 * body.outer_radius, body.length))
         across = f"from {inner:.6g} to {outer:.6g} mm in diameter, {(outer - inner) / 2:.6g} mm thick"
         output.print(f"{body.name}: rubber {across}, {long:.6g} mm long")
+        if len(written) > 1:
+            warning = f"these dimensions were written for all {len(written) - 1} parts, whatever their shape"
+            output.warn([Caveat("same_dimensions", warning)])
     wanted = ("programme", "cycles", "frequency", "frequencies", "amplitude", "amplitudes")
     for inspection in inspections:
         facts = [f"{key}: {fact}" for key, fact in inspection.facts.items() if key in wanted or key.startswith("from ")]
@@ -114,8 +117,8 @@ def command(files: tuple[Path, ...], name: str | None, no_input: bool, output: O
     output.write(folder, results, document, files)
     following = f"bushfit {'batch' if len(written) > 1 else 'run'} {quote_path(folder / target)}"
     if any(reason.kind == "to_reduce" for reason in left_out):
-        again = "bushfit reduce as stated above, then bushfit init again with sweep.csv"
-        following = f"{again}; or, without these tests, {following}"
+        again = "convert the histories as stated above, and give sweep.csv to bushfit init"
+        following = f"{again}; or, without these tests: {following}"
     output.print(f"next: {following}")
 
 
@@ -202,13 +205,13 @@ def inspect_sources(
                 "this is a raw stepped-sine history, not a sweep",
                 file=inspection.file,
                 expected="hysteresis loops and sweeps",
-                hint=f"{_reduce_command(direction, [source])} converts it to sweep.csv; give sweep.csv instead",
+                hint=f"convert it, and give sweep.csv in its place: {_reduce_command(direction, [source])}",
             )
         histories[direction].append(source)
     for direction, raw in histories.items():
         several = f"{len(raw)} raw stepped-sine histories, {direction}"
         subject, objects = (several, "them") if len(raw) > 1 else (f"{raw[0]}: a raw stepped-sine history", "it")
-        sentence = f"{subject}; {_reduce_command(direction, raw)} converts {objects} to sweep.csv"
+        sentence = f"{subject}; to convert {objects} to sweep.csv: {_reduce_command(direction, raw)}"
         left_out.append(Caveat("to_reduce", sentence))
     return inspections, left_out
 

@@ -134,6 +134,12 @@ class Output:
         check_free(folder, files, overwrite=self.force)
         return folder
 
+    @staticmethod
+    def command(words: str, name: str) -> str:
+        """Command that runs as printed: with --force if its default folder, for a result of this name, exists."""
+        folder = Path("results", folder_name(name), words.split()[0])
+        return f"bushfit {words}{' --force' * folder.exists()}"
+
     def print(self, text: str) -> None:
         """Print a line of the result without interpreting markup."""
         self.console.print(text, markup=False)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,17 +14,14 @@ from bushfit.cli.options import FILE, command_called, direction_option, file_opt
 from bushfit.cli.output import Output, with_output
 from bushfit.cli.shared_options import grid_options, number_up_to, quantity
 from bushfit.errors import error_location
-from bushfit.units import display_unit, number
+from bushfit.units import number
 
 if TYPE_CHECKING:
     from bushfit.planning.contract import Aim
-    from bushfit.planning.document import PlanFile
     from bushfit.planning.plan import Plan
 
 #: Maximum of --hours; larger values are typing errors.
 _MOST_HOURS = 2000.0
-#: Maximum number of effects printed without -v: those that the plan detects least well compared with the standard.
-_MOST_EFFECTS = 6
 #: Maximum number of amplitudes or frequencies of a test that are all printed.
 _MOST_VALUES = 6
 
@@ -156,7 +152,6 @@ def _print_plan(output: Output, plan: Plan) -> None:
         for name, target in targets.items():
             if target["why"]:
                 output.print(f"{name} is not met: {target['why']}")
-    _print_effects(output, document)
     if document["enough"]:
         output.print(document["enough"])
     output.warn(to_caveats(document["warnings"], document["warning_kinds"]))
@@ -183,21 +178,3 @@ def _listed(values: Sequence[float], factor: float) -> str:
 def _percents(rows: Mapping[str, Mapping[str, Any]], keys: Sequence[str]) -> list[tuple[str, ...]]:
     """Format rows of numbers by name as table rows: the name, then the values of the given keys in percent."""
     return [(name, *(number(100.0 * row[key], 2) for key in keys)) for name, row in rows.items()]
-
-
-def _print_effects(output: Output, document: PlanFile) -> None:
-    """Print the smallest parameter value of each effect that the plan, and the standard tests, would detect."""
-    amounts_of = document["visible"]
-    ranked = sorted(amounts_of.items(), key=lambda row: (row[1]["standard"] or inf) / (row[1]["planned"] or inf))
-    printed = ranked if output.verbose else ranked[:_MOST_EFFECTS]
-    title = (
-        "smallest amount of an effect that the tests detect (probability 90 %, and above the errors of the rig): "
-        f"{len(printed)} of {len(ranked)} effects{'; -v lists all' * (len(printed) < len(ranked))}"
-    )
-    rows = []
-    for name, amounts in printed:
-        sizes = [amounts["planned"], amounts["standard"]]
-        unit, factor = display_unit(amounts["unit"], 1.0, next(filter(None, sizes), 1.0))
-        words = ["none" if size is None else number(size * factor, 3) for size in sizes]
-        rows.append((name, amounts["parameter"], *words, unit))
-    output.print_table(title, ("effect", "amount", "plan", "standard", "unit"), rows, text_columns=2)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +9,7 @@ import click
 
 from bushfit.cli.options import FILE, command_called, flag, option, option_group
 from bushfit.cli.output import Output, with_output
-from bushfit.cli.printing import print_tests
+from bushfit.cli.printing import permitted_use, print_tests
 from bushfit.cli.shared_options import displacement_unit, prediction_options, quantity, static_rate_option
 
 if TYPE_CHECKING:
@@ -133,12 +132,11 @@ def _print_summary(output: Output, predicted: PredictionOutput) -> None:
     from bushfit.units import format_range
 
     places = list(dict.fromkeys(str(prediction.direction) for prediction in predicted.predictions))
-    verdict = f"{', '.join(places)} predicted with 95 % bands"
-    action = "The prediction may be used: there are no warnings."
+    bands = "with 95 % bands" if predicted.result.measured else "without bands, because the model was not fitted"
+    verdict = f"{', '.join(places)} predicted {bands}"
     if warnings := predicted.warnings:
         verdict += f", with {len(warnings)} warning{'s' * (len(warnings) > 1)}"
-        first = min(warnings, key=attrgetter("rank"))
-        action = f"{first.subject}: {first.consequence}" if first.subject in places else first.consequence
+    action = permitted_use(warnings, "The prediction may be used: there are no warnings.", places)
     output.print_headline(predicted.result.name, verdict, action)
     for prediction in predicted.predictions:
         force, loss = prediction.direction.display.stiffness, prediction.loss_factor.value

@@ -2,18 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING
 
+from bushfit.caveat import GENERAL
 from bushfit.cli.output import Output
 from bushfit.units import format_range, number
 
 if TYPE_CHECKING:
+    from bushfit.caveat import Caveat
     from bushfit.model.result import ExpectedError, Misfit, Result
     from bushfit.prediction.validation import Validation
 
 #: Largest number of tests that are shown without -v, those with the largest misfit.
 _MOST_TESTS = 8
+
+
+def permitted_use(warnings: Sequence[Caveat], otherwise: str, places: Collection[str] = ()) -> str:
+    """Consequence of the most important warning for the use of the numbers.
+
+    Args:
+        warnings: warnings of the numbers.
+        otherwise: sentence if there are no warnings.
+        places: directions and specimens of the numbers, which the consequence names if the warning is about one.
+    """
+    if not warnings:
+        return otherwise
+    first = min(warnings, key=lambda warning: (warning.rank, warning.consequence == GENERAL))
+    return f"{first.subject}: {first.consequence}" if first.subject in places else first.consequence
 
 
 def print_validations(output: Output, validations: Sequence[Validation]) -> None:

@@ -106,7 +106,7 @@ def command(files: tuple[Path, ...], levels: str | None, cycles: int, output: Ou
     results = [ResultFile("sweep", "table", points), ResultFile("reduce", "figure", figure)]
     output.write(folder, results, document, files)
     following = f"bushfit init {quote_path(folder / file)} --amplitude zero-to-peak"
-    output.print(f"next: {following}, or write into a campaign in {folder}:\n\n{snippet}")
+    output.print(f"for a campaign in {folder}:\n\n{snippet}\nnext, write a new campaign: {following}")
 
 
 def _resonance_table(file: Path, test_options: Mapping[str, Any], shaker: Mapping[str, Any]) -> Table | None:

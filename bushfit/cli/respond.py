@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from bushfit.caveat import join_names
 from bushfit.cli.file_options import metadata_options, options_named, require_tests
 from bushfit.cli.options import FILE, Option, command_called, flag, option, option_group
 from bushfit.cli.output import Output, with_output
+from bushfit.cli.printing import permitted_use
 from bushfit.cli.shared_options import TEMPERATURE, quantity
 
 if TYPE_CHECKING:
@@ -73,12 +75,7 @@ def print_response(output: Output, response: ResponseOutput) -> None:
     """Print peak and rms force, power, largest strain and rate of each direction, and collect the warnings."""
     from bushfit.units import number
 
-    duration = number(response.responses[0].history.step * response.time.size, 3)
-    labels = ", ".join(part.label for part in response.responses)
-    output.print_headline(
-        response.result.name, f"{labels}: force over {duration} s, {response.time.size} rows, with 95 % bands"
-    )
-    rows = []
+    rows, duration = [], number(response.responses[0].history.step * response.time.size, 3)
     for part in response.responses:
         unit, factor = part.direction.display.force
         strain, rate = (abs(values).max() for values in (part.strain, part.strain_rate))
@@ -87,6 +84,13 @@ def print_response(output: Output, response: ResponseOutput) -> None:
         strains = number(100.0 * strain, 3), shares[0], number(rate, 3), shares[1]
         power = f"{number(part.power, 3)} {'W/m^3' if part.direction.motion.force_unit == 'Pa' else 'W'}"
         rows.append((str(part.direction), *forces, power, *strains))
+    verdict = f"force up to {join_names(f'{row[1]} {row[0]}' for row in rows)} over {duration} s"
+    if all(part.tested for part in response.responses):
+        share = max(max(part.shares_beyond) for part in response.responses)
+        beyond = f"{number(100.0 * share, 2)} % of the time beyond the" if share else "within the"
+        verdict += f", {beyond} tested strains and strain rates"
+    action = permitted_use(response.warnings, "The force may be used with its 95 % band.", [row[0] for row in rows])
+    output.print_headline(response.result.name, verdict, action)
     heads = ("peak", "rms", "mean power", "strain [%]", "beyond tests", "rate [1/s]", "beyond tests")
     output.print_table("force, power, and largest strain and rate", ("direction", *heads), rows)
     output.warn(response.warnings)

@@ -5,19 +5,19 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from bushfit.caveat import join_names
 from bushfit.cli.diagnose import print_findings, print_verdict
 from bushfit.cli.options import command_called
 from bushfit.cli.output import Output, with_output
 from bushfit.cli.predict import print_predictions
 from bushfit.cli.printing import print_origin, print_result, print_step, print_validations
 from bushfit.cli.shared_options import campaign_options, exit_above, open_campaign
-from bushfit.units import format_range, number
+from bushfit.errors import quote_path
+from bushfit.units import format_range
 
 if TYPE_CHECKING:
     from bushfit.campaign.schema import Loss
     from bushfit.commands.run import RunOutput
-    from bushfit.fitting.procedures import TwoStep
-    from bushfit.model.result import Result
 
 
 @command_called("run", "configs/cmp_15961.toml")
@@ -45,17 +45,18 @@ def command(campaigns: tuple[Path, ...], loss: Loss | None, max_nrmse: float | N
     if diagnosis and diagnosis.added:
         effects, before = diagnosis.result.model.effects, diagnosis.before.model.effects
         added = [effect_label(name) for name in effects if name not in before]
-        action += f"with {' and '.join(added)}; joint.json is the fit without {'it' if len(added) == 1 else 'them'}"
+        action += f"with {join_names(added)}; joint.json is the fit without {'it' if len(added) == 1 else 'them'}"
     elif diagnosis and (diagnosis.changed or diagnosis.verdict == "unexplained"):
         action = ""  # no model to use before the record is corrected, or the cause is known
     else:
         action += "the joint fit"
-    print_run(output, campaign.name, outcome, action)
+    again = output.command(f"diagnose {quote_path(campaign.path)}{f' --loss {loss}' if loss else ''}", campaign.name)
+    print_run(output, campaign.name, outcome, action, again)
     output.write(folder, outcome.files, outcome.document, input_files(campaign))
     exit_above(max_nrmse, outcome.result)
 
 
-def print_run(output: Output, name: str, outcome: RunOutput, action: str) -> None:
+def print_run(output: Output, name: str, outcome: RunOutput, action: str, again: str) -> None:
     """Print the result of `bushfit run`, with -v each step, and one line on the paper's two-step procedure.
 
     Args:
@@ -63,10 +64,11 @@ def print_run(output: Output, name: str, outcome: RunOutput, action: str) -> Non
         name: name of the campaign.
         outcome: results of all steps.
         action: next step for the user, printed below the verdict.
+        again: command that repeats the diagnosis.
     """
     diagnosed, result = outcome.diagnosed, outcome.result
     if diagnosed:
-        print_verdict(output, diagnosed, action)
+        print_verdict(output, diagnosed, again, action)
     else:
         output.print_headline(name, "every parameter is fixed, so there is nothing to diagnose", action)
     print_result(output, f"{name}: {'model to use' if outcome.added else 'joint fit'}", result)
@@ -84,8 +86,8 @@ def print_run(output: Output, name: str, outcome: RunOutput, action: str) -> Non
             print_step(output, f"{name}: static and dynamic fit in turn", two_step.result, "dynamic.json")
         if outcome.added:
             print_step(output, f"{name}: joint fit", joint, "joint.json")
-    left_out = f"{outcome.reason_left_out}: the two-step procedure is skipped"
-    output.print(two_step_line(two_step, joint) if two_step else left_out)
+    left_out, shown = f"{outcome.reason_left_out}: skipped", "static.json and dynamic.json; -v shows the parameters"
+    output.print(f"two-step procedure of the paper: {shown if two_step else left_out}")
 
 
 def _print_range(output: Output, outcome: RunOutput) -> None:
@@ -101,24 +103,3 @@ def _print_range(output: Output, outcome: RunOutput) -> None:
         frequency = format_range("Hz", min(frequencies), max(frequencies))
         use = "" if str(direction) in measured.directions else ", not fitted"
         output.print(f"  {direction}: {frequency}, {format_range(unit, min(amplitudes), max(amplitudes))}{use}")
-
-
-def two_step_line(two_step: TwoStep, joint: Result) -> str:
-    """Sentence that compares the paper's two-step procedure with the joint fit, in standard errors of the procedure.
-
-    Args:
-        two_step: result of the two-step procedure, with its passes.
-        joint: result of the joint fit.
-    """
-    found, differences = two_step.result, dict[str, float]()
-    for name in joint.fitted:
-        if error := found.covariance.stderr(name):
-            differences[name] = abs(found.model.values[name] - joint.model.values[name]) / error
-    passes = len(two_step.passes)
-    parts = [f"{passes} pass{'es' * (passes > 1)}"]
-    if found.at_bound:
-        parts.append(f"ended at a bound: {', '.join(found.at_bound)}")
-    elif differences:
-        farthest = max(differences, key=differences.__getitem__)
-        parts.append(f"up to {number(differences[farthest], 2)} standard errors from the joint fit ({farthest})")
-    return f"two-step procedure (the paper's): {', '.join(parts)} (static.json, dynamic.json; -v shows the parameters)"

@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from pathlib import Path
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import Loss
@@ -15,7 +14,7 @@ from bushfit.diagnosis import workflow
 from bushfit.diagnosis.document import DiagnosisFile
 from bushfit.diagnosis.record import Diagnosis, DiagnosisSettings, level_of
 from bushfit.effects.unnamed import NAME as UNNAMED
-from bushfit.errors import FitError, quote_path
+from bushfit.errors import FitError
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.procedures import NEXT
 from bushfit.model.model import Model
@@ -35,17 +34,17 @@ class DiagnosisOutput:
         data: the campaign, prepared for a fit.
         diagnosis: the diagnosis.
         document: content of diagnosis.json.
-        command: command with its options that repeats the diagnosis.
         files: documents, tables, figure and page.
         validations: comparisons of the model to use with the validation records of the campaign.
+        rivals: effects that the tests cannot distinguish, between which a plan of this campaign decides; may be empty.
     """
 
     data: PreparedCampaign
     diagnosis: Diagnosis
     document: DiagnosisFile
-    command: str
     files: Sequence[ResultFile]
     validations: Sequence[Validation] = ()
+    rivals: Sequence[str] = ()
 
     def __repr__(self) -> str:
         return f"{self.data.campaign.name}: {self.headline}\n  {self.diagnosis.summary}"
@@ -57,19 +56,17 @@ class DiagnosisOutput:
         return "; ".join(filter(None, (self.diagnosis.verdict, unknown)))
 
     @property
-    def adopt(self) -> str:
-        """Advice to run the diagnosis again with the named causes adopted, with the command; "" if it is not useful.
+    def adoptable(self) -> list[str]:
+        """Effects and mistakes to adopt if tests confirm them; empty if it is useless to adopt them.
 
-        It is not useful without a named cause, if the named effects are certain and in the model already, or if a part
-        of the tests has to be measured again first.
+        It is useless if the named effects are certain and in the model already, or if a part of the tests has to be
+        measured again first.
         """
-        if self.diagnosis.measure_again:
-            return ""
         causes = [entry for entry in self.diagnosis.effects if entry.name != UNNAMED]
-        if self.diagnosis.verdict == "named" and not any(level_of(e.name) in ("record", "unresolved") for e in causes):
-            return ""
-        labels = [entry.label for entry in causes]
-        return f"if tests confirm {' and '.join(labels)}: {' --adopt '.join([self.command, *labels])}" if labels else ""
+        is_open = any(level_of(entry.name) in ("record", "unresolved") for entry in causes)
+        if self.diagnosis.measure_again or (self.diagnosis.verdict == "named" and not is_open):
+            return []
+        return [entry.label for entry in causes]
 
     @property
     def result(self) -> Result:
@@ -113,12 +110,7 @@ def diagnose(
     numbers = {"max_effects": max_effects, "tolerance": tolerance}
     changed = {key: f"{number:g}" for key, number in numbers.items() if number != getattr(DiagnosisSettings, key)}
     options = option_words(model="MODEL.json" if start else None, adopt=adopt, without=without, **changed)
-    path = data.campaign.path
-    printed_path = quote_path(Path(path.name) if path.is_absolute() else path)  # results hold no machine's paths
-    command = " ".join(["bushfit diagnose", printed_path, *options])
     diagnosis = workflow.diagnose(data, start.model if start else None, settings)
-    if path.suffix == ".toml":
-        diagnosis = _with_commands(diagnosis, printed_path, command, can_plan=not (start or adopt))
     if not (diagnosis.changed or start or adopt):  # the model to use is that of fit
         plain = (joint or fit(data)).result
         warnings = (replace(warning, text=warning.text.removesuffix(NEXT)) for warning in plain.warnings)
@@ -143,7 +135,8 @@ def diagnose(
     ]
     files += validation_files(validations, title)
     files.append(ResultFile("report", "page", partial(report_page, files)))
-    return DiagnosisOutput(data, diagnosis, document, command, files, validations)
+    rivals = () if start or adopt else next(iter(undecided_effects(diagnosis)), ())
+    return DiagnosisOutput(data, diagnosis, document, files, validations, rivals)
 
 
 def _require_free_parameter(data: PreparedCampaign, model: Model | None, settings: DiagnosisSettings) -> None:
@@ -163,24 +156,3 @@ def _require_free_parameter(data: PreparedCampaign, model: Model | None, setting
             found="every parameter is fixed by vary = false",
             hint="bushfit fit shows how well the given values meet the tests; to diagnose, free a parameter",
         )
-
-
-def _with_commands(diagnosis: Diagnosis, path: str, command: str, *, can_plan: bool) -> Diagnosis:
-    """Complete the commands in the texts of a diagnosis, and add one that plans tests to separate its candidates.
-
-    Args:
-        diagnosis: the diagnosis.
-        path: path of the campaign.
-        command: command with all its options that repeats the diagnosis.
-        can_plan: True if `bushfit plan` would start from the same model and tests: nothing was adopted.
-    """
-    next_test = diagnosis.next_test
-    if can_plan and (sets := undecided_effects(diagnosis)):
-        next_test += f"; bushfit plan CAMPAIGN --rivals {','.join(sets[0])} selects tests that distinguish them"
-
-    def complete(text: str) -> str:
-        return text.replace("bushfit diagnose CAMPAIGN", command).replace("CAMPAIGN", path)
-
-    warnings = (replace(warning, text=complete(warning.text)) for warning in diagnosis.result.warnings)
-    result = replace(diagnosis.result, warnings=tuple(warnings))
-    return replace(diagnosis, next_test=complete(next_test), result=result)

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.ndimage import zoom
 
-from bushfit.caveat import Caveat
+from bushfit.caveat import Caveat, join_names
 from bushfit.effects import BASE
 from bushfit.effects.contract import Array
 from bushfit.effects.mistakes import MISTAKES, Mistake, file_or_name, get_mistake, option_label
@@ -80,7 +80,7 @@ class Claim:
         files = [file_or_name(test.test) for test in self.affected]
         if len({*files}) < len(files):
             files = [test.name for test in self.affected]
-        return self.mistake.sentence.format(files=" and ".join(filter(None, (", ".join(files[:-1]), *files[-1:]))))
+        return self.mistake.sentence.format(files=join_names(files))
 
     @property
     def corrections(self) -> tuple[str, ...]:

@@ -113,7 +113,8 @@ def describe_gap(
             description = Description(law.phase_deg, law.frequency_power, law.amplitude_power, law.sentence)
             sentence += f"; {law.sentence}"
     model = replace(fitted.model, effects=(*fit.model.effects, NAME), unnamed=correction)
-    after, whole = plain.reevaluate(model, harmonic), plain.reevaluate(model, fit.data_sets)
+    after = plain.reevaluate(model, with_gain_weighting(harmonic, weigh=True))
+    whole = plain.reevaluate(model, fit.data_sets)
     holdout = beside_effects if before is None else _hold_out_inside(before, closest, correction)
     return GapDescription(after, fitted, holdout, description, sentence, _validity_sentence(correction, whole))
 

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from bushfit.caveat import join_names
 from bushfit.diagnosis.fits import misfit_covariance
 from bushfit.diagnosis.hypotheses import Hypothesis
 from bushfit.diagnosis.record import CandidateResult, Odds, format_probability
@@ -35,11 +36,11 @@ def undecided_text(reported: Sequence[Composition]) -> str:
     """Return a sentence on the explanations that the tests cannot distinguish, and on the parts they share."""
     parts = [[label.replace("fault: ", "a fault of ") for label in composition.labels] for composition in reported]
     shared = [name for name in parts[0] if all(name in names for names in parts)]
-    common = f"{' and '.join(shared)} {'is' if len(shared) == 1 else 'are'} part of every probable explanation"
+    common = f"every probable explanation contains {join_names(shared)}"
     rests = [" + ".join(name for name in names if name not in shared) for names in parts]
     if "" in rests:
-        return f"{common}; a further cause is possible: {' or '.join(filter(None, rests))}"
-    sentence = f"these tests cannot distinguish between {', '.join(rests[:-1])} and {rests[-1]}"
+        return f"{common}; a further cause is possible: {join_names(filter(None, rests), 'or')}"
+    sentence = f"these tests cannot distinguish between {join_names(rests)}"
     return f"{sentence}; {common}" if shared else sentence
 
 
@@ -59,7 +60,7 @@ def causes_text(candidates: Sequence[Composition], finding: Finding) -> list[str
         return [f"check first whether {' or whether '.join(claim.sentence for claim in claims.values() if claim)}"]
     leads = [name for name in finding.leads if not any(name in candidate.causes for candidate in candidates)]
     if leads:
-        return [f"the gap is smaller with {' and '.join(leads)}"]
+        return [f"{join_names(leads)} would reduce the gap, but not close it"]
     return [] if candidates else ["no known effect explains the gap"]
 
 

@@ -131,7 +131,9 @@ class PowerLaw:
         if not self.of_one_place and len(quantities) < len(_QUANTITIES):
             parts.append(" or ".join(_QUANTITIES[quantity] for quantity in quantities))
         like = self._known_law() if all(self.determined) else ""
-        return f"acts like {like}: " * bool(like) + ", ".join(parts or ["these tests do not determine its form"])
+        return (f"acts like {like}: " if like else "the refitted model needs ") + ", ".join(
+            parts or ["these tests do not determine its form"]
+        )
 
     def _known_law(self) -> str:
         """Name of the element (spring, damper, ...) with nearly the phase and powers of this law; "" without one."""

@@ -11,7 +11,7 @@ from functools import reduce
 
 import numpy as np
 
-from bushfit.caveat import Caveat
+from bushfit.caveat import Caveat, join_names
 from bushfit.diagnosis.closing import Closing, close_gap, with_free_gains
 from bushfit.diagnosis.document import Verdict
 from bushfit.diagnosis.explanation_text import (
@@ -33,7 +33,6 @@ from bushfit.diagnosis.rig_shares import with_alternatives
 from bushfit.diagnosis.search import Search
 from bushfit.diagnosis.verdict import LEVELS, NAMELESS, Composition, Finding, decide_verdict
 from bushfit.effects import get_effect, get_parameter, qualified_name
-from bushfit.effects.mistakes import get_mistake
 from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.fitting.problem import FitResult
 from bushfit.model.model import Model
@@ -101,12 +100,12 @@ class DiagnosisWriter:
         why = f"lowers chi-square by {base.chi_square - fit.chi_square:.0f}"
         why += " with the other named effects" * (len(names) > 1)
         entries = [NamedCause(name, f"{why}; {probability_text(first, self.finding)}") for name in names]
-        summary, advice = f"{' and '.join(names)} {verbs[0]} the gap", ""
+        summary, advice = f"{join_names(names)} {verbs[0]} the gap", ""
         if self.finding.verdict == "partly":
             excess = [max(fitted.mean_square - 1.0, 0.0) for fitted in (base, fit)]
             share = 100.0 * (1.0 - excess[1] / excess[0]) if excess[0] else 100.0
-            part = f"{number(share, 2)} %" if share >= 1.0 else "part"
-            summary = f"{' and '.join(names)} {verbs[1]} {part} of the gap"
+            part = "more than 99 %" if share > 99.0 else f"{number(share, 2)} %" if share >= 1.0 else "part"
+            summary = f"{join_names(names)} {verbs[1]} {part} of the gap"
             if share < 50.0:  # the next test is for the larger part
                 advice = _LEVELS_ADVICE if first.best.levels else get_effect(UNNAMED).confirmed_by
             entries += [NamedCause(UNNAMED, gap.evidence)] if gap else []
@@ -167,19 +166,16 @@ class DiagnosisWriter:
         """Diagnosis of a gap that no known effect explains: a smooth correction, or the tests to measure again."""
         gap, candidates = closing.gap, self._candidates
         advice = self._deciding_advice(candidates[0] if candidates else first)
-        if leads := [f"--adopt {name}" for name in self.finding.leads if get_mistake(name) is None]:
-            trial = f"without a test, try: bushfit diagnose CAMPAIGN {' '.join(leads)}"
-            advice = "; ".join(filter(None, (advice, trial)))
         parts = {part.name for part in first.best.faulty_parts}
-        at_fault, is_faulty = " and ".join(sorted(parts)), self.finding.verdict == "unexplained"
+        at_fault, is_faulty = join_names(sorted(parts)), self.finding.verdict == "unexplained"
         if not gap and not first.best.unnamed and first.best.p_value >= DOES_NOT_FIT:
             shared = (c.probability for c in self.finding.reported if parts & {x.name for x in c.best.faulty_parts})
             is_faulty |= sum(shared) >= LEAST_NAMED_SHARE
         if gap:
-            before, after = (fit.mean_square**0.5 for fit in (self.search.base, gap.after))
+            before, after = gap.holdout.before or 1.0, gap.holdout.after or 1.0
             closes = "closes the gap"
-            if after > max(LARGEST_CLOSED_GAP, 0.1 * before):
-                closes = f"reduces the gap to {number(after, 2)} times the noise"
+            if after > LARGEST_CLOSED_GAP:
+                closes = f"reduces the held-out gap from {number(before, 2)} to {number(after, 2)} times the noise"
             sentences = [f"a smooth correction {closes}: {gap.sentence}", *causes_text(candidates, self.finding)]
             sentences += [f"it is largest at {at_fault}"] if at_fault else []
         elif is_faulty and at_fault:
@@ -288,7 +284,7 @@ class DiagnosisWriter:
         odds = explanation_odds(self.finding)
         result = with_alternatives(odds.averaged(fitted), self.hypotheses, base, search.settings.tolerance)
         amounts = filter(None, (format_amount(entry.name, result) for entry in entries))
-        rest = [f"the rest: {' and '.join(remainder)}"] if remainder else []
+        rest = [f"the rest: {join_names(remainder)}"] if remainder else []
         return Diagnosis(
             verdict or self.finding.verdict,
             "; ".join([summary, *amounts, *rest]),

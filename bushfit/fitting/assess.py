@@ -335,7 +335,7 @@ def temperature_warning(model: Model, data_sets: Sequence[MeasuredTest]) -> list
     tested = f"{warmest} was tested at {number(high, 3)} degC and {coldest} at {number(low, 3)} degC"
     sentence = (
         f"{tested}, {number(high - low, 3)} degC apart. This model has no effect of temperature, so another "
-        "effect may absorb the difference: run bushfit fit CAMPAIGN --effect temperature, or fit each temperature alone"
+        "effect may absorb the difference: fit with --effect temperature, or fit each temperature alone"
     )
     return [Caveat("temperatures_differ", sentence)]
 

@@ -226,19 +226,15 @@ class MeasuredLoop(MeasuredBase):
 
     def relative_difference(self, model: Model) -> Array:
         """Model minus measured force at each row, relative to half the measured force range, (1, n)."""
-        return ((self.response(model) - self.measured_force) / self.half_range)[None]
+        return (self._difference(model) / self.half_range)[None]
 
     def relative_distance(self, model: Model) -> Array:
-        """Absolute difference of model and measured force at rows with weight, relative to half the force range.
-
-        The mean difference is subtracted, because the zero of a load cell is unknown.
-        """
-        difference = self.relative_difference(model)[0, self.weights > 0.0]
-        return np.abs(difference - np.mean(difference))
+        """Absolute difference of model and measured force at rows with weight, relative to half the force range."""
+        return np.abs(self.relative_difference(model)[0, self.weights > 0.0])
 
     def misfit(self, model: Model) -> Array:
         """Model minus measured force at each row, in units of the row's noise, (n,); 0 at rows without weight."""
-        return (self.response(model) - self.measured_force) * self._per_noise
+        return self._difference(model) * self._per_noise
 
     def distance(self, model: Model) -> Array:
         """Absolute difference between model and measured force at each row, in units of noise, (n,)."""
@@ -246,8 +242,12 @@ class MeasuredLoop(MeasuredBase):
 
     def displayed_residual(self, model: Model) -> Array:
         """Residuals for charts, model minus measured in units of noise, (size,), including points without weight."""
-        distance = (self.response(model) - self.measured_force) / self.noise
-        return np.where(self.weights > 0.0, self.misfit(model), distance)
+        return np.where(self.weights > 0.0, self.misfit(model), self._difference(model) / self.noise)
+
+    def _difference(self, model: Model) -> Array:
+        """Model minus measured force at each row, less the mean, because the zero of a load cell is unknown, (n,)."""
+        difference = self.response(model) - self.measured_force
+        return difference - np.mean(difference[self.weights > 0.0])
 
     def outlier_indices(self, model: Model) -> Array:
         """Indices of the rows whose force is far from the harmonics fitted to the loop, (k,); `model` is not used."""

@@ -357,7 +357,7 @@ def _require_bushing(bushing: Bushing | None, place: Place) -> Bushing:
             "there is no bushing",
             place=str(place),
             expected="a [bushing] table with radii and length: each direction belongs to a bushing",
-            hint="bushfit predict MODEL.json --bushing other.toml predicts a bushing of the same compound",
+            hint="to predict a bushing of the same compound: bushfit predict MODEL.json --bushing other.toml",
         )
     return bushing
 

@@ -83,7 +83,7 @@ def recognize_table(file: Path, test_options: Mapping[str, Any]) -> tuple[Table,
     with suppress(BushfitError):  # whose columns are not those of a resonance test
         resonance = open_table(content, RESONANCE_COLUMNS, test_options)
     if resonance and is_resonance(resonance):
-        hint = f'bushfit reduce {quote_path(file)} --mass "..." converts it to a sweep'
+        hint = f'to convert it to a sweep: bushfit reduce {quote_path(file)} --mass "..."'
         problem, expected = "this is a resonance test, not a sweep", "loops and sweeps"
         raise resonance.error(problem, kind=ResonanceTestError, expected=expected, hint=hint)
     if not opened:

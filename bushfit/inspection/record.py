@@ -272,7 +272,7 @@ def campaign_tables(files: Sequence[Inspection], folder: Path | None = None) -> 
             file_name = printable(name)
             typed = f'"{file_name}"' if " " in file_name else file_name
             command = f"bushfit reduce {typed} --direction {place or '...'}"
-            tables.append(f"# {file_name} is a raw history: {command} converts it to a sweep\n")
+            tables.append(f"# {file_name} is a raw history. To convert it to a sweep: {command}\n")
             continue
         lines = [f"[[{_TABLES[inspection.kind]}]]", f"file = {toml_value(name)}"]
         if not isinstance(place, Specimen):

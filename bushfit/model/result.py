@@ -8,7 +8,9 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
-from bushfit.caveat import Caveat
+from bushfit.caveat import Caveat, join_names
+from bushfit.effects import BASE
+from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.effects.unnamed import Unnamed
 from bushfit.errors import ModelError
 from bushfit.geometry import Bushing, Direction, Place, Specimen, get_place
@@ -345,12 +347,14 @@ class Result:
         if not self.alternatives:
             return []
         rivals = [one for one in self.alternatives if not {*one.model.effects} <= {*self.model.effects}]
-        names = dict.fromkeys(name for one in rivals for name in one.model.effects if name not in self.model.effects)
+        effects = ([name for name in one.model.effects if name not in (*BASE, UNNAMED)] for one in rivals)
+        names = dict.fromkeys(" with ".join(added) for added in effects)
         used = "a smooth correction" if self.model.unnamed else "the most probable model"
         sentence = "the tests permit other values of the parameters"
         if names:
             share = 100.0 * sum(one.probability for one in rivals)
-            sentence = f"the prediction uses {used}, but may lack {' or '.join(names)} (probability {share:.0f} %)"
+            causes = join_names(names, "or")
+            sentence = f"the prediction uses {used}, but the tests permit {causes} (probability {share:.0f} %)"
         return [Caveat("undecided", f"{sentence}: the bands, low to high, include each alternative")]
 
     @property

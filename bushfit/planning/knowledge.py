@@ -9,11 +9,13 @@ import numpy as np
 
 from bushfit.campaign.schema import RigSettings
 from bushfit.campaign.simulated import SimulatedLoop, SimulatedSweep
+from bushfit.caveat import join_names
 from bushfit.diagnosis.fits import fit_model, fit_rivals, result_of, start_rivals
 from bushfit.diagnosis.propose import proposals
 from bushfit.diagnosis.record import Diagnosis
 from bushfit.diagnosis.workflow import diagnose
 from bushfit.effects import LIBRARY, get_effect, place_suffix, twins_of
+from bushfit.effects.unnamed import effect_label
 from bushfit.errors import ModelError, did_you_mean
 from bushfit.fitting.coordinates import Bounds, Coordinates, relative_sizes
 from bushfit.fitting.preparation import MeasuredTest, split_by_kind
@@ -60,7 +62,8 @@ def from_campaign(data: PreparedCampaign, rivals: Sequence[str] | None = None) -
             for no rivals.
 
     Returns:
-        Knowledge of the likeliest model, with its rivals.
+        Knowledge of the likeliest model, with its rivals: the fitted model, or if it misses the tests the model of a
+        diagnosis.
 
     Raises:
         FitError: the data cannot support the fit.
@@ -68,7 +71,7 @@ def from_campaign(data: PreparedCampaign, rivals: Sequence[str] | None = None) -
     """
     _check_rivals([name for name in rivals or () if not place_suffix(name)], LIBRARY)
     diagnosis = None if rivals is None else diagnose(data)
-    noise = estimate_noise(data)
+    noise, unchanged = estimate_noise(data), data
     data = PreparedCampaign.from_campaign(replace(data.campaign, rig=with_rig_class(data.campaign.rig, noise)))
     data_sets = data.require_tests(data.data_sets, "there is nothing to fit", "add measured tests to the campaign")
     model = data.starting_model(data.effects, data_sets)
@@ -83,7 +86,13 @@ def from_campaign(data: PreparedCampaign, rivals: Sequence[str] | None = None) -
         return _with_bounded_parameters(plain, bounded, data_sets) if bounded else plain
 
     if diagnosis is None or rivals is None:
-        return knowledge(fit_model(model, data_sets, fixed, data.bounds))
+        fitted = knowledge(fit_model(model, data_sets, fixed, data.bounds))
+        if fitted.result.model_error is None:
+            return fitted
+        found = diagnose(unchanged)
+        added = [name for name in found.result.model.effects if name not in model.effects]
+        source += f", with {join_names(map(effect_label, added))} as bushfit diagnose adds to the model"
+        return replace(from_result(found.result, noise, source), tests=fitted.tests) if added else fitted
     sets = undecided_effects(diagnosis)
     names = list(dict.fromkeys(twins_of(name)[0] for name in rivals or next(iter(sets), ())))
     if not names:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bushfit.caveat import Caveat
+from bushfit.caveat import Caveat, join_names
 from bushfit.errors import ModelError
 from bushfit.planning.candidates import unlimited_rig_warning
 from bushfit.planning.contract import Knowledge, PlanRequest, Test
@@ -203,7 +203,7 @@ def plan_warnings(search: PlanSearch) -> Iterator[Caveat]:
         yield warning
     stiffnesses = (quantity for quantity in search.predictions if quantity.name.startswith("stiffness"))
     model_error = max((float(quantity.model_error.max()) for quantity in stiffnesses), default=0.0)
-    if model_error > _NOTABLE_RATIO - 1.0:
+    if model_error > _NOTABLE_RATIO - 1.0 and not knowledge.rivals:
         yield Caveat(
             "plan_model_error",
             f"the errors of the stiffness include the model error, up to {number(100.0 * model_error, 2)} %, "
@@ -214,7 +214,7 @@ def plan_warnings(search: PlanSearch) -> Iterator[Caveat]:
     if knowledge.bounded:
         yield Caveat(
             "plan_at_bound",
-            f"{' and '.join(knowledge.bounded)} ended at a bound: the planned errors of the other parameters "
+            f"{join_names(knowledge.bounded)} ended at a bound: the planned errors of the other parameters "
             "include half of the additional error of a fit without the bound",
         )
     if search.goals and not search.determines_noise(counts):

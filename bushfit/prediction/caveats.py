@@ -5,7 +5,7 @@ from itertools import chain
 
 import numpy as np
 
-from bushfit.caveat import Caveat
+from bushfit.caveat import Caveat, join_names
 from bushfit.effects import Level, get_effect
 from bushfit.effects.contract import Array
 from bushfit.geometry import Bushing, Direction, Place, bushing_at
@@ -109,7 +109,7 @@ def unfitted_warnings(result: Result, direction: Place) -> Iterator[Caveat]:
         return
     corrected = {effect.corrects for effect in result.model.without(Level.INSTRUMENT).records}
     bushing = bushing_at(result.model.bushing, direction)
-    tests = " and ".join(filter(None, (", ".join(fitted[:-1]), fitted[-1])))
+    tests = join_names(fitted)
     axes = {place.axis for place in result.fitted_places}
     if str(direction) in fitted:
         is_radial = direction.axis is Direction.RADIAL and corrected.isdisjoint(direction.labels)

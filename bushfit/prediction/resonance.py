@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from bushfit.caveat import Caveat
+from bushfit.caveat import Caveat, join_names
 from bushfit.effects.contract import UNKNOWN, Array, RubberConditions
 from bushfit.errors import ModelError
 from bushfit.geometry import TRANSLATION, Place
@@ -127,6 +127,6 @@ def predict_resonance(
         warnings += [*result.undecided, spread.about(subject)]
     if if_in_rig:
         peak, ratio = (number(value, 4) for value in if_in_rig.peak)
-        sentence = f"at {peak} Hz, |T| {ratio}, if {' and '.join(result.unresolved)} belongs to the rig"
+        sentence = f"at {peak} Hz, |T| {ratio}, with {join_names(result.unresolved)} in the rig"
         warnings.append(Caveat("resonance_if_rig", sentence).about(subject))
     return replace(predicted, warnings=tuple(warnings), if_in_rig=if_in_rig, conditions=conditions)

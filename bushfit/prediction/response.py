@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.fft import next_fast_len
 
-from bushfit.caveat import Caveat
+from bushfit.caveat import Caveat, join_names
 from bushfit.effects.contract import UNKNOWN, Array, RubberConditions
 from bushfit.effects.history import History
 from bushfit.effects.unnamed import NAME as UNNAMED
@@ -241,12 +241,12 @@ def _warnings(result: Result, response: TimeResponse, left_out: list[str]) -> li
         )
         of_motion.append(Caveat("friction_laws_differ", sentence))
     if left_out:
-        sentence = f"{' and '.join(left_out)} left out, because no law describes this motion"
+        sentence = f"{join_names(left_out)} left out, because no law describes this motion"
         of_motion.append(Caveat("effects_without_law", sentence))
     if constant := result.model.constant_modifiers:
         unit, factor = place.display.displacement
         sine = f"{number(history.frequency, 3)} Hz and {number(factor * history.amplitude.item(), 3)} {unit}"
-        of_motion.append(Caveat("constant_effects", f"{' and '.join(constant)} constant, as in a sine of {sine}"))
+        of_motion.append(Caveat("constant_effects", f"{join_names(constant)} constant, as in a sine of {sine}"))
     strokes, (unit, factor) = np.abs(history.turning.strides), place.display.displacement
     start = abs(float(history.value[0]))
     if not history.periodic and start > _JUMP * np.abs(np.diff(history.value)).max():

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from bushfit.caveat import Caveat
+from bushfit.caveat import Caveat, join_names
 from bushfit.effects import Level
 from bushfit.effects.contract import UNKNOWN, Array, RubberConditions
 from bushfit.errors import ModelError
@@ -188,14 +188,14 @@ def point_warnings(
         loss_difference = prediction.loss_factor.value - measured.imag / measured.real
         ends = [number(end, 2, "+") for end in (np.nanmin(loss_difference), np.nanmax(loss_difference))]
         sentence = (
-            f"without {' and '.join(rig)} the predicted stiffness is {percent}, and the predicted loss factor "
+            f"without {join_names(rig)} the predicted stiffness is {percent}, and the predicted loss factor "
             f"{' to '.join(ends)}, compared with the measured values"
         )
         yield Caveat("rig_difference", sentence).about(place)
     if prediction.if_in_rig and not np.allclose(prediction.if_in_rig.stiffness.value, stiffness, rtol=_SAME):
         percent = format_deviation(prediction.if_in_rig.stiffness.value / stiffness)
-        names = " and ".join(result.unresolved)
-        sentence = f"stiffness {percent} if {names} belongs to the rig; the band, low to high, includes both"
+        names = join_names(result.unresolved)
+        sentence = f"stiffness {percent} with {names} in the rig; the band, low to high, includes both"
         yield Caveat("stiffness_if_rig", sentence).about(place)
 
 

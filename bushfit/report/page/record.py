@@ -11,7 +11,7 @@ from zipfile import BadZipFile
 import numpy as np
 import pandas as pd
 
-from bushfit.errors import ModelError
+from bushfit.errors import ModelError, quote_path
 from bushfit.geometry import Direction, Place
 from bushfit.model.file import from_document, read_document
 from bushfit.model.result import Result
@@ -101,7 +101,7 @@ def read_results(folder: Path) -> list[ResultFile]:
             file=folder,
             found=", ".join(present) or "nothing",
             expected=" or ".join(f"{name}.json" for name in MODELS),
-            hint=f"bushfit run CAMPAIGN -o {folder} writes a model",
+            hint=f"to write a model: bushfit run CAMPAIGN -o {quote_path(folder)}",
         )
     paths = {name: folder / f"{name}.json" for name in (*MODELS, JOINT, "diagnosis")}
     documents = {name: read_document(path) for name, path in paths.items() if path.exists()}
