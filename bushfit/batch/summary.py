@@ -316,7 +316,7 @@ class BatchResult:
             for part, record in zip(parts, self.records, strict=True)
             if not (part.poor_fit or record.verdict or _MISFITS.isdisjoint(part.warning_kinds))
         ]
-        chi_square = self.estimates[FIT_QUALITY["reduced_chi_square"].name][0]
+        chi_square = self.estimates.get(FIT_QUALITY["reduced_chi_square"].name, np.full((1, 1), np.nan))[0]
         if len(parts) > 1 and np.all(chi_square >= BEYOND_NOISE):
             ends = format_range("", chi_square.min(), chi_square.max()).strip()
             sentence = f"the model misses the tests of all {len(parts)} parts (reduced chi-square {ends})"

@@ -121,7 +121,8 @@ def print_verdict(output: Output, diagnosed: DiagnosisOutput, again: str, action
     lines += [*diagnosed.diagnosis.summary.split("; "), *format_odds(diagnosed.document)]
     if labels := diagnosed.adoptable:
         adopted = "".join(f" --adopt {quote_path(label)}" for label in labels)
-        lines.append(f"if tests confirm {join_names(labels)}: {again}{adopted}")
+        source = "the records" if any(effect["correction"] for effect in diagnosed.document["effects"]) else "tests"
+        lines.append(f"if {source} confirm {join_names(labels)}: {again}{adopted}")
     for line in lines:
         output.console.print(f"  {escape(line)}")
 

@@ -86,7 +86,7 @@ def print_run(output: Output, name: str, outcome: RunOutput, action: str, again:
             print_step(output, f"{name}: static and dynamic fit in turn", two_step.result, "dynamic.json")
         if outcome.added:
             print_step(output, f"{name}: joint fit", joint, "joint.json")
-    left_out, shown = f"{outcome.reason_left_out}: skipped", "static.json and dynamic.json; -v shows the parameters"
+    left_out, shown = f"skipped ({outcome.reason_left_out})", "static.json and dynamic.json; -v shows the parameters"
     output.print(f"two-step procedure of the paper: {shown if two_step else left_out}")
 
 

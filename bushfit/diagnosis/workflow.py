@@ -20,7 +20,7 @@ from bushfit.diagnosis.verdict import decide_verdict
 from bushfit.effects import effect_name_of, get_effect, place_suffix, qualified_name
 from bushfit.effects.mistakes import get_candidate, get_mistake
 from bushfit.effects.unnamed import NAME as UNNAMED
-from bushfit.errors import FitError
+from bushfit.errors import FitError, quote_path
 from bushfit.fitting.descent import Descent
 from bushfit.fitting.preparation import split_by_kind, with_gain_weighting
 from bushfit.fitting.prepared_campaign import PreparedCampaign
@@ -67,9 +67,8 @@ def diagnose(
         except FitError as error:
             thousands = [claim for claim in claims(data, settings.without) if claim.mistake.scales]
             for claim in ClaimScreening(data).best(thousands, 1):
-                error.hint = (
-                    f"these tests agree if {claim.sentence}: --adopt {' --adopt '.join(claim.labels)} corrects it"
-                )
+                adopted = " --adopt ".join(map(quote_path, claim.labels))
+                error.hint = f"these tests agree if {claim.sentence}: --adopt {adopted} corrects it"
             raise
         known_rows = {(outlier.test, outlier.row) for outlier in excluded}  # a robust fit finds them anew
         candidates = (*outliers, *list_outliers(base.model, split_by_kind(base.data_sets)[1]))

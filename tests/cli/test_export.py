@@ -112,7 +112,7 @@ PAPER = (
 MOUNT = (
     "radial: fitted with the paper's formula, for this shape +4.3 % in stiffness and +26 % in strain compared",
     "sleeve_compliance is assigned to the bushing, but these tests cannot distinguish it from rig_compliance",
-    " % if sleeve_compliance belongs to the rig; the band, low to high, includes both",
+    " % with sleeve_compliance in the rig; the band, low to high, includes both",
 )
 
 

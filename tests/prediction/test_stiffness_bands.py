@@ -76,7 +76,7 @@ def test_what_may_be_the_rigs_is_predicted_both_ways_and_the_bands_span_both(eit
     np.testing.assert_allclose(table[rigs[1]], found.if_in_rig.loss_factor.value)
     said = "\n".join(map(str, (*found.warnings, *caveats(either))))
     assert "is assigned to the bushing, but these tests cannot distinguish it from rig_compliance" in said
-    assert "% if sleeve_compliance belongs to the rig; the band, low to high, includes both" in said
+    assert "% with sleeve_compliance in the rig; the band, low to high, includes both" in said
     assert predict(either, Direction.RADIAL, FREQUENCIES, AMPLITUDES, rig=True).warnings == told.warnings
     shaken = predict_resonance(either, Direction.RADIAL, 1.0, 1.0, None)
     assert shaken.if_in_rig.peak[0] > 1.02 * shaken.peak[0]
