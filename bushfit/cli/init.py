@@ -64,6 +64,7 @@ def command(files: tuple[Path, ...], name: str | None, no_input: bool, output: O
     """
     from bushfit.geometry import Specimen
     from bushfit.inspection.gathering import gather
+    from bushfit.inspection.plausible import implausible_strain
     from bushfit.inspection.record import campaign_text, campaigns_of_parts, with_specimens_named
 
     test_options: Mapping[str, Any] = sizes.pop("test_options")
@@ -102,7 +103,8 @@ def command(files: tuple[Path, ...], name: str | None, no_input: bool, output: O
         facts = [f"{key}: {fact}" for key, fact in inspection.facts.items() if key in wanted or key.startswith("from ")]
         test = inspection.file.parent / inspection.label
         output.print(f"{test}: {inspection.kind}, {inspection.direction}; {'; '.join(facts)}")
-        output.warn(warning.about(inspection.label) for warning in inspection.odd)
+        strain = implausible_strain(inspection.measured, bushing[0]) if bushing and inspection.measured else ()
+        output.warn(warning.about(inspection.label) for warning in (*inspection.odd, *strain))
     for sentence, count in Counter(inspection.assumed for inspection in inspections).items():
         if sentence:
             output.print(f"{count} test{'s' * (count > 1)}: {sentence}")

@@ -11,14 +11,14 @@ import numpy as np
 
 from bushfit.caveat import Caveat
 from bushfit.geometry import Place
-from bushfit.reading.headers import ZERO_TO_PEAK, AmplitudeConvention, plain
+from bushfit.reading.headers import HINTS, ZERO_TO_PEAK, AmplitudeConvention, plain
 from bushfit.reading.levels import read_condition
 from bushfit.reading.names import Labels, StatedQuantity, labels_in_names
 from bushfit.reading.roles import UNIT_NAMES
 from bushfit.reading.si_columns import columns_key
 from bushfit.reading.table import Table
 from bushfit.reading.times import sampling_rate_above
-from bushfit.units import is_compatible, is_unit, parse_quantity, si_factor
+from bushfit.units import common_unit, is_compatible, is_unit, parse_quantity, si_factor
 
 #: Conditions of a test that a campaign states, with their names in sentences.
 _CONDITIONS = {key: key for key in ("temperature", "preload", "date", "operator")} | {"specimen_number": "specimen"}
@@ -144,11 +144,11 @@ def _constant_quantity(
     if len(found) == 1:
         return origin, found[0]
     listed = [f"{quantity.text} {quantity.convention or ''}".rstrip() for quantity in found]
-    usual = {"m": "0.1 mm", "Hz": "10 Hz", "1": "0.1 %"}
-    example = _zero_to_peak(found[0].text, found[0].convention) if found else usual.get(expected, "1 deg")
-    state = f'state {key} = "{example}" in the campaign'
+    sizes = [_zero_to_peak(quantity.text, quantity.convention) for quantity in found]
+    state = " or ".join(f'{key} = "{size}"' for size in sizes or [f"... {common_unit(expected)[1]}"])
+    state = f"state {state} in the campaign"
     if "block" in table.headers:
-        state = f'write a [[sweeps]] table for each block with rows = {{ block = "1" }} and {key} = "{example}"'
+        state = f"{HINTS['level_of_blocks']} {key}"
     counting = ', with amplitude = "peak-to-peak" if it counts so' if role == "amplitude" else ""
     raise table.header_error(
         f"the {role} of this test is not stated",

@@ -14,6 +14,7 @@ from bushfit.errors import error_location
 from bushfit.geometry import Direction, Place, Specimen
 from bushfit.inspection.labels import contradicting_lines, count_temperatures, keys_from_labels, labels_of_file
 from bushfit.inspection.loops import describe_history, describe_loop, describe_programme
+from bushfit.inspection.plausible import implausible_strain
 from bushfit.inspection.recognition import recognize_table, test_direction, tested_body
 from bushfit.inspection.record import ColumnDescription, Findings, Inspection, Kind
 from bushfit.inspection.sweeps import describe_sweep
@@ -90,6 +91,7 @@ def inspect_file(
             entry.setdefault("preload", preload)
     time_step = measured.time_step if isinstance(measured, Loop) and measured.has_recorded_time else None
     odd += contradicting_lines(table, time_step)
+    odd += implausible_strain(measured, None) if isinstance(place, Specimen) else ()
     contents = describe_format(table), describe_columns(table, is_sweep=is_sweep), facts | label_facts, tuple(odd)
     is_uncounted = is_sweep and not counted and "amplitude" not in entry
     return Inspection(file, kind, place, *contents, entry, measured, amplitude_convention_unknown=is_uncounted)

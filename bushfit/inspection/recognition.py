@@ -12,7 +12,7 @@ from bushfit.campaign.bodies import SpecimenSettings
 from bushfit.errors import BushfitError, NoTestError, ResonanceTestError, quote_path
 from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Direction, Motion, Place, Specimen
 from bushfit.reading.finding import find_table
-from bushfit.reading.headers import LOOP_COLUMNS, RESONANCE_COLUMNS, SWEEP_COLUMNS, Vocabulary
+from bushfit.reading.headers import HINTS, LOOP_COLUMNS, RESONANCE_COLUMNS, SWEEP_COLUMNS, Vocabulary
 from bushfit.reading.labelled import Rows
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.names import direction_of_file, named_direction
@@ -27,11 +27,6 @@ from bushfit.validation import validate_tables
 
 #: Keys of [[specimens]] for the sizes of a block in shear.
 BLOCK_KEYS = ("area", "thickness", "elements")
-#: Campaign keys for the column of the loss, which a symbol such as D or psi does not distinguish.
-_LOSS_COLUMN = (
-    'columns = { loss_factor = "..." } or columns = { damping_ratio = "..." }, half of the loss factor, or '
-    'columns = { specific_damping = "..." }, 2 pi times the loss factor, or columns = { damping_coefficient = "..." }'
-)
 #: Headers of a bar in tension: E', |E*|, "storage modulus E'", "tensile strain".
 _TENSILE = re.compile(r"(?<![^\W_])E(?![^\W_])|young|tensile|tension|traction|zug", re.IGNORECASE)
 
@@ -69,6 +64,8 @@ def recognize_table(file: Path, test_options: Mapping[str, Any]) -> tuple[Table,
             complete.append((table, is_sweep))
         elif is_sweep and not complete:
             refuse_ambiguous_damping(table)
+    largest = max((len(table.roles) for table, _ in opened), default=0)  # of f, A, K and phi, f and phi are no loop
+    complete = [one for one in complete if one[1] or 2 * len(one[0].roles) > largest + 1]
     if complete:  # a sweep before a loop, and columns of a stiffness or modulus before the amplitude of a force
         direct = [pair for pair in PAIRS if pair[0] != "force_amplitude"]
 
@@ -89,14 +86,14 @@ def recognize_table(file: Path, test_options: Mapping[str, Any]) -> tuple[Table,
     if not opened:
         errors = [error for _, error in failed]
         raise NoTestError(**vars(next((one for one in errors if one.problem != "there is no known header"), errors[0])))
-    best, is_sweep = max(opened, key=lambda one: len(one[0].roles))
+    best, is_sweep = max(opened, key=lambda one: (len(one[0].roles), not one[1]))
     for usual, failure in failed:
         if len(best.roles) <= max(1, len(Vocabulary(usual, {}).roles(best.headers))):
             raise failure
     understood = ", ".join(role.replace("_", " ") for role in best.roles)
     lacking = missing_role(best, is_sweep=is_sweep) or "force"
     column = columns_key(best, lacking, si_unit(lacking, best.motion))
-    advice = f"correct the header, or name the column: {_LOSS_COLUMN if lacking == 'loss_factor' else column}"
+    advice = f"correct the header, or name the column: {HINTS['loss_factor'] if lacking == 'loss_factor' else column}"
     if set(best.roles) in ({"time", "displacement"}, {"time", "force"}) and '"..."' in column:
         history = "a displacement alone is a history for bushfit respond; " * (lacking == "force")
         advice = f"{history}a test needs a column for the {lacking}, too: if another file has it, join the two"

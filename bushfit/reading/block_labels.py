@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING
 from bushfit import units
 from bushfit.caveat import Caveat
 from bushfit.geometry import Place, Specimen
-from bushfit.reading.headers import COUNTED, SWEEP_COLUMNS, Vocabulary
+from bushfit.reading.headers import COUNTED, HINTS, SWEEP_COLUMNS, Vocabulary, plain_name, split_unit
+from bushfit.reading.layout import STEPS
 from bushfit.reading.lines import Line, is_summary_row
 from bushfit.reading.names import (
     is_remark,
@@ -58,6 +59,15 @@ def find_lines_above(table: Table) -> list[Line]:
     not_above = (layout.header_line, layout.units_line)
     lines = [line for line in table.source.head if line.number <= last and line.number not in not_above]
     lines = [plain_numbers(line, table.first_decimal) for line in lines]
+    for index, (header, unit) in enumerate(zip(table.headers, layout.units, strict=True)):
+        if plain_name(header) in STEPS and is_like_number(unit):  # of an oscilloscope
+            lines.append(Line(last, [header, unit]))
+        elif (
+            plain_name(header) in STEPS
+            and len({row[index] for row in table.first_rows} - {""}) == 1
+            and (unit or split_unit(header)[1])
+        ):
+            lines.append(Line(last, [header, table.first_row[index], unit]))
     marks = {mark: header for header in table.headers for mark in _FOOTNOTE_MARK.findall(header)}
     for line in table.source.tail():
         cells = list(map(str, cells_of(line, layout.delimiter)))
@@ -87,11 +97,17 @@ def find_remarks(table: Table) -> tuple[Caveat, ...]:
     """
     remarks = ((line.number, line.text[:_LONGEST_QUOTE]) for line in table.lines_above if is_remark(line.text))
     warnings = [Caveat("remark", f'line {number} is not understood: "{text}"') for number, text in remarks]
-    for line in table.lines_above if table.first_decimal is None else ():
+    names = [Line(0, name.replace("_", " ")) for name in (table.source.sheet, table.file.stem) if name]
+    for line in [*names, *(table.lines_above if table.first_decimal is None else ())]:
         forms = [plain_numbers(line, mark) for mark in ".,"]
-        if labels_above(forms[:1]) != labels_above(forms[1:]):
+        read = [labels_above([form]) if line.number else labels_in_names(form.text) for form in forms]
+        if read[0] != read[1]:
             meanings = " or ".join(f'"{form.text[:_LONGEST_QUOTE]}"' for form in forms)
-            warnings.append(Caveat("remark", f"line {line.number} can be read in two ways: {meanings}"))
+            place = f"line {line.number}" if line.number else f'the name "{line.text}"'
+            sentence = (
+                f"{place} can be read in two ways: {meanings}; the number is not used. Options state what is right"
+            )
+            warnings.append(Caveat("remark", sentence))
     rows = [] if all(is_like_number(str(cell)) for cell in table.first_row) else table.first_rows
     texts = Counter(cell for row in rows for cell in row if isinstance(cell, str) and cell[:1].isalpha())
     warnings += [
@@ -118,12 +134,8 @@ def note_coupon(table: Table, place: Place) -> Iterator[Caveat]:
     """
     texts = [table.file.stem, table.source.sheet or "", *(line.text for line in table.lines_above), *table.headers]
     if not isinstance(place, Specimen) and (named := [text for text in texts if names_coupon(text)]):
-        sentence = (
-            f'"{named[0][:_LONGEST_QUOTE]}" may name a coupon, but the test is read as one of a bushing. A block in '
-            'shear needs --area "..." --thickness "..." --elements N, or [[specimens]] in the campaign; for a strip or '
-            "bar, write strain and stress into the file"
-        )
-        yield Caveat("coupon", sentence)
+        sentence = f'"{named[0][:_LONGEST_QUOTE]}" may name a coupon, but the test is read as one of a bushing'
+        yield Caveat("coupon", f"{sentence}. {HINTS['coupon']}")
 
 
 def label_columns(

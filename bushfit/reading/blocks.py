@@ -16,7 +16,7 @@ from bushfit.reading.layout import Layout
 from bushfit.reading.lines import WITH_UNIT, Line, is_comment, is_row, is_summary_row, is_units_row, split
 from bushfit.reading.names import NO_LABELS, labels_above, named_quantities
 from bushfit.reading.numerals import common_decimal, is_like_number, plainest_value
-from bushfit.reading.roles import PAIRS, UNIT_NAMES, is_test, with_conversions
+from bushfit.reading.roles import UNIT_NAMES, is_test
 from bushfit.reading.source import Channels, RowSource, Sheet, Text, cells_of
 
 #: Largest text that is searched for blocks without their own headers [bytes]; chosen: some 100,000 rows.
@@ -175,22 +175,25 @@ def _find_sides(layout: Layout, vocabulary: Vocabulary) -> list[Side]:
     for names in map(list, {tuple(by_index.values()): by_index.values() for by_index in columns.values()}.values()):
         sides = {name: by_index for name, by_index in columns.items() if list(by_index.values()) == names}
         used, roles = set().union(*sides.values()), vocabulary.roles(names)
-        known = with_conversions(roles)
         plain_names = {plain(split_unit(name)[0]) for name in names}
         free = [index for index in range(len(written)) if index not in used]
         shared = [index for index in free if without_mean(split_unit(written[index][0])[0]) not in plain_names]
         are_repeats = next(iter(sides)).isdigit() and len(shared) < len(free)  # numbers beside their mean
         shared_roles = vocabulary.roles([layout.headers[index] for index in shared])
-        available = known | shared_roles if are_repeats else known
-        has_stiffness = any({*pair} <= available for pair in PAIRS if pair[0] != "force_amplitude")
-        is_sweep = "frequency" in shared_roles and has_stiffness and len(roles) == len(names)
+        levels = {"frequency"} if all(units.is_compatible(_unit_of(name), "Hz") for name in sides) else set()
+        available = roles | levels | (shared_roles if are_repeats else shared_roles & {"frequency"})
+        is_complete = is_test(available) and len(roles) == len(names)
         are_equal = names == [layout.headers[index] for index in next(iter(sides.values()))]
         is_named = are_repeats or (len(names) > 1 and not next(iter(sides)).isdigit())
-        is_loop = "time" in roles and is_test(roles)
-        is_side = len(names) > 1 if are_equal else (is_sweep and is_named) or is_loop
+        is_side = len(names) > 1 if are_equal else is_complete and (is_named or "time" in roles)
         if len(sides) > 1 and len({*names}) == len(names) and is_side:
             return [Side(shared, [*by_index], names, name * (not are_equal)) for name, by_index in sides.items()]
     return []
+
+
+def _unit_of(text: str) -> str:
+    """Unit of a quantity such as "5 Hz"; "?" if the text is no quantity."""
+    return match["unit"] if (match := WITH_UNIT.fullmatch(text)) else "?"
 
 
 def _side_by_side(source: RowSource, layout: Layout, sides: Sequence[Side]) -> list[Segment]:
@@ -372,7 +375,7 @@ def _common_unit(texts: Sequence[str], stated: str) -> str:
 
     If the header states the same unit in other words, such as deg for °, or two ratios, its unit is returned.
     """
-    found = list(dict.fromkeys(match["unit"] if (match := WITH_UNIT.fullmatch(text)) else "?" for text in texts))
+    found = list(dict.fromkeys(map(_unit_of, texts)))
     is_temperature = bool(found) and all(map(units.kelvin_scale, found)) and len(found) == 1
     is_unit = bool(found) and all(units.is_compatible(unit, found[0]) for unit in found)
     if is_unit and stated and units.is_compatible(found[0], stated):

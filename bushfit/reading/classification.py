@@ -68,14 +68,15 @@ def classify(
     extremes: dict[tuple[str, Extreme], Column] = {}
     rejected: set[str] = set()
     role_by_index = _stated_indices(table, vocabulary, columns)
-    for index, header in sorted(enumerate(table.headers), key=lambda column: plain_name(column[1]) == "k"):  # after K*
+    vague = {n for n, header in enumerate(table.headers) if plain_name(header) == "k" or header in "fF"}
+    for index, header in sorted(enumerate(table.headers), key=lambda column: column[0] in vague):  # after K* and freq
         heading = vocabulary.heading(header, table.layout.units[index]) if header else None
         if index in role_by_index:
             meaning = Vocabulary({"": [units.split_header(header)[0]]}, {"": header}).heading(header)
             heading = replace(meaning or Heading(""), role=role_by_index[index])
         elif heading and heading.role in {*role_by_index.values(), *rejected}:
             continue
-        if heading is None or (plain_name(header) == "k" and heading.role in roles):
+        if heading is None or (index in vague and heading.role in roles):
             continue
         is_empty = heading.role == "time" and table.first_row[index] == ""
         if is_empty and all(row[index] == "" for row in table.first_rows) and table.labels_above.sampling:
@@ -112,6 +113,10 @@ def classify(
         if written != column.unit and units.is_compatible(written, column.unit or ""):
             sentence = f'"{column.header}" is read in the stated unit {column.unit}, not in {written} of the header'
             notes.append(Caveat("stated_unit", sentence))
+    if {"displacement", "force"} <= {*roles} and "time" in table.names and "time" not in roles:
+        x = column_of(table, Heading("time"), 0, stated_units.get("time"))  # over which programs write histories
+        if plain_name(x.header) == "x" and units.is_compatible(x.unit or "s", "s") and not table.labels_above.sampling:
+            roles["time"] = x
     if {"force_amplitude", "stiffness"} & set(roles) and "amplitude" not in roles:
         notes += add_motion_as_amplitude(table, roles, stated_units)
     if "damping_coefficient" in roles and "stiffness" in roles and "stiffness" not in columns:

@@ -8,7 +8,7 @@ from bushfit.errors import MeasurementError, error_location
 from bushfit.geometry import TRANSLATION, Motion
 from bushfit.reading.blocks import combine_blocks
 from bushfit.reading.classification import classify
-from bushfit.reading.headers import ALL_COLUMNS, Vocabulary
+from bushfit.reading.headers import ALL_COLUMNS, HINTS, Vocabulary
 from bushfit.reading.labelled import Rows, select_rows
 from bushfit.reading.layout import DELIMITERS, FileFormat, Layout, find_layout
 from bushfit.reading.parts import OpenedFile, open_file
@@ -18,11 +18,6 @@ from bushfit.reading.source import RowSource, Sheet
 from bushfit.reading.table import Table
 from bushfit.reading.wide import unpivot
 
-_NUMBERED_COLUMNS = (
-    'columns = { time = "1", displacement = "2", force = "3" } (without time, but with sampling_rate = "100 Hz", if '
-    "column 1 counts the rows) or "
-    'columns = { frequency = "1", amplitude = "2", stiffness = "3", loss_factor = "4" }'
-)
 _EXPECTED_HEADER = 'a header row such as "time [s],displacement [mm],force [N]"'
 
 
@@ -76,7 +71,7 @@ def find_table(
         hint = "if it was copied from a PDF cell by cell, copy it again as a table, or write each row on one line"
         raise table.header_error("there is only one column", expected=expected, hint=hint)
     if table.layout.headerless and not any(text.isdecimal() for text in columns.values()):
-        hint = f"state the numbers of the columns and their units in the campaign: {_NUMBERED_COLUMNS}"
+        hint = f"state the numbers of the columns and their units in the campaign: {HINTS['numbers']}"
         raise table.header_error("there is no known header", found=None, expected=_EXPECTED_HEADER, hint=hint)
     table = classify(table, vocabulary, columns, stated_units)
     essential = ({"displacement", "force"}, *map(set, PAIRS))

@@ -8,14 +8,14 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from types import MappingProxyType
-from typing import Literal, TypeVar, get_args
+from typing import Any, Literal, TypeVar, get_args
 
 from bushfit import units
 
 #: Known words in column headers, names and labels, from words.toml, by table and key.
-WORDS: Mapping[str, Mapping[str, Sequence[str]]] = tomllib.loads(
-    Path(__file__).with_name("words.toml").read_text(encoding="utf-8")
-)
+WORDS: dict[str, dict[str, Any]] = tomllib.loads(Path(__file__).with_name("words.toml").read_text(encoding="utf-8"))
+#: Next steps that errors suggest, by what is missing.
+HINTS: Mapping[str, str] = WORDS.pop("hints")
 
 
 def _expand(name: str) -> list[str]:
@@ -85,9 +85,7 @@ _TRAVEL, _TWO_PRIMES = re.compile(r"s\s*/"), re.compile(r"(?<![^\W_])([A-Za-z])\
 #: Words that do not change the meaning of a channel.
 _ASIDES = re.compile(r"\b(?:axial|radial|torsional|measured|actual|gemessen|mesure|medido|ist)\b")
 #: Words for the mean of several parts, which do not change the meaning of a stiffness or its loss.
-_MEANS = re.compile(
-    r"\b(?:mean|average|avg|mittel(?:wert)?|medel(?:varde)?|moyenne?|media|promedio|gemiddelde?|srednia|prumer|ortalama)\b"
-)
+_MEANS = re.compile(rf"\b(?:{'|'.join(WORDS['qualifiers']['means'])})\b")
 #: Footnote marks in a name.
 _FOOTNOTES = str.maketrans("", "", "\u00b9\u00b2\u00b3\u2070\u2074\u2075\u2076\u2077\u2078\u2079\u2020\u2021")
 #: Units with which the symbol f cannot mean a role, by name and role.

@@ -20,7 +20,7 @@ import numpy as np
 
 from bushfit.errors import MeasurementError
 from bushfit.reading.formats import read_arrow, read_matlab, read_mdf, read_tdms
-from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS, Vocabulary
+from bushfit.reading.headers import HINTS, LOOP_COLUMNS, SWEEP_COLUMNS, Vocabulary
 from bushfit.reading.layout import Layout
 from bushfit.reading.lines import Line
 from bushfit.reading.source import Channel, Channels, Group, Sheet
@@ -31,8 +31,6 @@ from bushfit.reading.workbook import read_workbook
 _REAL = Vocabulary(
     {"time": LOOP_COLUMNS["time"], **{role: SWEEP_COLUMNS[role] for role in ("frequency", "amplitude")}}, {}
 )
-_MATLAB_HINT = 'save vectors, or structs of vectors, with -v7; convert a table with table2struct(T, "ToScalar", true)'
-_UFF_HINT = "export records or frequency responses as dataset 58; of dataset 55, only frequency responses are read"
 
 
 class Format(NamedTuple):
@@ -57,10 +55,10 @@ class Format(NamedTuple):
 
 #: Supported formats of recordings.
 _FORMATS = (
-    Format("MATLAB", (".mat",), rb"MATLAB (?:5\.0|7\.3) MAT-file", read_matlab, _MATLAB_HINT),
+    Format("MATLAB", (".mat",), rb"MATLAB (?:5\.0|7\.3) MAT-file", read_matlab, HINTS["matlab"]),
     Format("HDF5", (".h5", ".hdf5"), rb"\x89HDF", read_matlab),
     Format("TDMS", (".tdms",), rb"TDSm", read_tdms),
-    Format("UFF", (".uff", ".unv"), rb" {4}-1 *\r?\n +\d+", read_uff, _UFF_HINT),
+    Format("UFF", (".uff", ".unv"), rb" {4}-1 *\r?\n +\d+", read_uff, HINTS["uff"]),
     Format("MDF", (".mf4", ".mdf"), rb"MDF     |UnFinMF ", read_mdf),
     Format("Parquet or Arrow", (".parquet", ".feather", ".arrow"), rb"PAR1|ARROW1", read_arrow),
     Format("", (), rb"PK\x03\x04|\xd0\xcf\x11\xe0", read_workbook, again="save it again as xlsx, or as CSV"),

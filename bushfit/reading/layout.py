@@ -18,7 +18,7 @@ from pydantic import BeforeValidator
 
 from bushfit.caveat import Caveat
 from bushfit.reading.channel_lists import listed_names, scales_above
-from bushfit.reading.headers import WORDS, Vocabulary, plain, split_unit
+from bushfit.reading.headers import WORDS, Vocabulary, plain, plain_name, split_unit
 from bushfit.reading.lines import MOST_COLUMNS, Content, Line, is_comment, is_row, is_units_row, split
 from bushfit.reading.numerals import is_like_number, plainest_value
 from bushfit.reading.roles import UNIT_NAMES, is_test, is_unit_alone, stated_once
@@ -38,10 +38,14 @@ _MOST_HEADINGS = 50
 _LONGEST_HEADER = 10_000
 #: Non-empty lines below a header that are searched for its units row and first numbers; chosen: room for comments.
 _LINES_BELOW_HEADER = 8
+#: Names of the rate and the step of the rows, and of their start.
+STEPS = frozenset(map(plain, (*WORDS["above"]["sampling_rate"], *WORDS["above"]["sampling_interval"], "start")))
 #: Names in the first cells of rows that describe the columns, such as "Unit" and "dx".
 _DESCRIPTIONS = UNIT_NAMES | frozenset(map(plain, WORDS["rows_of"]["descriptions"]))
 #: Letter, which each name of a column has; and a number with a number sign: "#1".
 _LETTER, _NUMBERED = re.compile(r"[^\W\d_]"), re.compile(r"#\s?\d+\b")
+#: Names of the types of columns, in rows that programs write above or below the names; and what separates them.
+_TYPES, _SEPARATORS = frozenset(map(plain, ("", *WORDS["rows_of"]["types"]))), re.compile(r"[\s;,|]+")
 #: Blanks between a name and the bracket of its unit, which do not separate columns; and cell of a line whose columns
 #: are separated by wide gaps.
 _BLANK_BEFORE_BRACKET, _CELL = re.compile(r" {1,8}(?=[\[(])"), re.compile(r"\S+(?: \S+)*")
@@ -134,6 +138,7 @@ def find_layout(
     Returns:
         Layout of the table; its headers are empty if there are no lines.
     """
+    lines = [line for line in lines if not _TYPES.issuperset(map(plain, _SEPARATORS.split(line.text)))]
     if not lines:
         return Layout(delimiter or ",", (), 1, (), None)
     end, delimiters = _first_rows(lines, tuple(DELIMITERS.values()) if delimiter is None else (delimiter,))
@@ -259,15 +264,15 @@ def _likeliest(
         return first, delimiter, cells_of[delimiter]
     rows = [(mark, split(lines[end].content, mark)) for mark in delimiters]
     rows = [(mark, cells) for mark, cells in rows if len(cells) > 1 and all(map(is_like_number, cells))] or rows
-    for delimiter, row in rows:
-        cells = {index: split(lines[index].content, delimiter) for index in reversed(before)}
-        of_units = {index for index in cells if is_units_row(cells[index])}
-        # one more, because a comment may be empty
-        fitting = [n for n in cells if 0 <= len(cells[n]) - len(row) < 2 and n not in of_units]
-        if fitting := [n for n in fitting if all(map(_LETTER.search, filter(None, cells[n])))] or fitting:
-            index = next((index for index in fitting if index + 1 in of_units), fitting[0])
-            return index, delimiter, cells[index]
-    return end, *max(rows, key=lambda entry: len(entry[1]))
+    ranked = list[tuple[int, bool, bool, int, str, list[str]]]()
+    for (order, (delimiter, row)), index in product(enumerate(rows), before):
+        cells, below = (split(line.content, delimiter) for line in lines[index : index + 2])
+        # one more than numbers, because a comment may be empty; or more, if the row of units has as many
+        most = len(row) if len(cells) == len(below) and _are_units_of(cells, below) else 1
+        if 0 <= len(cells) - len(row) <= most and not is_units_row(cells):
+            is_named = all(map(_LETTER.search, filter(None, cells)))
+            ranked.append((-order, is_named, is_units_row(below), index, delimiter, cells))
+    return max(ranked)[3:] if ranked else (end, *max(rows, key=lambda entry: len(entry[1])))
 
 
 def _layout(
@@ -323,7 +328,7 @@ def _descriptions(below: Sequence[Line], delimiter: str, width: int) -> list[Lin
         return width > 2 and numbers == list(range(1, width + 1))
 
     named = [*takewhile(lambda line: (first := cells(line)[0]) != "" and not is_like_number(first), below)]
-    if any(plain(cells(line)[0]) in _DESCRIPTIONS for line in named):
+    if any(plain(split_unit(cells(line)[0])[0]) in _DESCRIPTIONS for line in named):
         return named
     before_rows = [*takewhile(lambda line: is_counted(line) or not is_row(cells(line)), below)]
     units_row = max((n for n, line in enumerate(before_rows) if is_units_row(cells(line))), default=0)
@@ -358,11 +363,17 @@ def _with_units(layout: Layout, lines: Sequence[Line], index: int, vocabulary: V
             wide = [cell.strip("[]() ") for cell in _below_headers(str(lines[index].content), line.content)]
             cells = wide if len(wide) == len(headers) else cells
         are_named = [vocabulary.heading(cell) is not None for cell in cells]
-        if len(cells) <= len(headers) and is_units_row(cells):
+        if _are_units_of(headers, cells):
             return replace(layout, units_line=line.number, units=(*cells, *empty)[: len(headers)])
         if any(are_named) and are_named == [*map(bool, cells)] and not vocabulary.roles(headers[: len(cells)]):
             return replace(layout, units_line=line.number, headers=(*cells, *headers[len(cells) :]))
     return layout
+
+
+def _are_units_of(headers: Sequence[str], cells: Sequence[str]) -> bool:
+    """True if a row has the units of the columns with some headers; the cell below a step or rate may be its number."""
+    others = [cell for header, cell in zip(headers, cells, strict=False) if plain_name(header) not in STEPS]
+    return len(cells) <= len(headers) and is_units_row(others)
 
 
 def _with_unnamed_columns(layout: Layout, below: Sequence[Sequence[str]]) -> Layout:

@@ -15,7 +15,6 @@ _SUMMARIES = frozenset(map(plain, WORDS["rows_of"]["summary"]))
 MOST_COLUMNS = 1000
 #: Largest number of characters of a line; chosen: a longer line is not a row of a table.
 LONGEST_LINE = 1 << 20
-csv.field_size_limit(LONGEST_LINE)
 _DIGIT = re.compile(r"\d")
 _COMMENT_SIGNS = ("#", "%", "//")
 #: Blanks between columns of cells with units, such as "5 Hz 0.1 mm": not behind a number without its unit.
@@ -48,6 +47,8 @@ def split(content: Content, delimiter: str) -> list[str]:
     """Return the texts of the cells of a line, stripped of blanks and without empty cells at the end."""
     if not isinstance(content, str):
         return [cell if isinstance(cell, str) else repr(cell) for cell in content]
+    if delimiter == "|" and content.lstrip().startswith("||"):
+        content = "|" + content.strip().strip("|").replace("||", "|")  # a header as Jira writes it
     text = content.rstrip(f" {delimiter}")
     if delimiter == " ":
         text = _END_OF_MATRIX_ROW.sub("", text)
@@ -56,7 +57,7 @@ def split(content: Content, delimiter: str) -> list[str]:
             found = [match["unit"] for match in map(WITH_UNIT.fullmatch, quantities) if match]
             return quantities if len(found) > 1 and all(map(units.is_unit, found)) else cells
         return cells
-    if '"' in text:
+    if '"' in text and len(text) < csv.field_size_limit():
         return [cell.strip() for cell in next(csv.reader([text], delimiter=delimiter, skipinitialspace=True), ())]
     return [cell.strip() for cell in text.split(delimiter, MOST_COLUMNS)]
 

@@ -10,7 +10,7 @@ from bushfit.caveat import Caveat
 from bushfit.geometry import ROTATION, Place
 from bushfit.reading.block_labels import note_coupon
 from bushfit.reading.finding import find_table
-from bushfit.reading.headers import LOOP_COLUMNS, Column, Vocabulary
+from bushfit.reading.headers import HINTS, LOOP_COLUMNS, Column, Vocabulary
 from bushfit.reading.labelled import Rows, note_not_understood
 from bushfit.reading.levels import rows_of_test
 from bushfit.reading.measurement import FEWEST_LOOP_ROWS, Floats, Loop
@@ -131,10 +131,8 @@ def loop_columns(table: Table, direction: Place, test: LoopFile) -> dict[str, Co
     if "time" in table.roles and not test.states_time:
         wanted["time"] = time_column(table, direction)
     elif not test.states_time:
-        rate = quantity_above(table, "m/s") or "10 mm/min"
-        hint = f'or state rate = "{rate}", or frequency = "0.1 Hz" and waveform = "sine", or '
-        hint += 'sampling_rate = "100 Hz", in the campaign'
-        si_column(table, "time", direction, hint)
+        rate = quantity_above(table, "m/s") or "... mm/min"
+        si_column(table, "time", direction, f'or state rate = "{rate}", {HINTS["time"]}')
     return wanted
 
 
@@ -149,7 +147,7 @@ def time_column(table: Table, place: Place) -> Column:
         return si_column(table, "time", place)
     numbers = first_numbers(table, [time])
     if not has_known_name and numbers.size > 2 and np.all(np.diff(numbers[:, 0]) == 1.0):
-        hint = 'state sampling_rate = "100 Hz" in the campaign, or the rate of the record, in place of this column'
+        hint = 'state sampling_rate = "... Hz" in the campaign, or the rate of the record, in place of this column'
         raise table.error("this column counts the rows", column=time, expected="times", hint=hint)
     if time.unit:
         return si_column(table, "time", place)
@@ -208,8 +206,7 @@ def increasing_time(table: Table, column: Column, time: Floats) -> tuple[Floats,
     even_rows = f'if the rows are evenly spaced, sampling_rate = "{rate}" in the campaign replaces this column'
     hint = f"{even_rows}; if a column numbers the runs, bushfit init makes one loop of each run"
     if "block" in table.headers:
-        hint = 'this file has several blocks: rows = { block = "1" } in the campaign selects the first; '
-        hint += "bushfit init uses all"
+        hint = HINTS["block"]
     elif np.all(np.diff(time) >= 0.0):
         hint = f"export the file again with more digits of the time; or, {even_rows}"
     elif steps.size and time[1:].min() <= time[0] + np.median(steps):

@@ -51,8 +51,7 @@ _DATE = re.compile(
 )
 #: Number of a specimen, after a word or as "P01": "SN12", "Nr. 7", "Probe_3", "#4"; but not the size in "Probe 3mm".
 _SPECIMEN_NUMBER = re.compile(
-    r"(?:(?:(?<![^\W_])(?:s[/_]?n|serial|nr|no|probe|specimen|sample|muster|prüfling|pruefling|éprouvette|probeta|part|teil"
-    r"|bauteil|bushing|buchse|lager|pièce|piece|palier|silentbloc|pieza|pezzo|casquillo|boccola|部品|试样|样品)|#)"
+    rf"(?:(?:(?<![^\W_])(?:s[/_]?n|serial|nr|no|{'|'.join(WORDS['beside']['specimen'])})|#)"
     rf"[\s_.:#-]*(?!\d+[.,]?\d*[\s_]?(?:{_UNIT_WORDS})(?![A-Za-z]))|(?<![^\W_])"
     r"(?=P\d{2,4}(?![^\W_])))(P?\d[A-Za-z0-9]*)(?![^\W_]|[.,]\d)",
     re.IGNORECASE,

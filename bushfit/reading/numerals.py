@@ -14,6 +14,7 @@ from functools import cached_property, lru_cache
 from itertools import islice, product
 from typing import TYPE_CHECKING, NamedTuple
 
+from bushfit.reading.headers import HINTS
 from bushfit.units import SUPERSCRIPTS
 
 if TYPE_CHECKING:
@@ -231,8 +232,7 @@ def find_numerals(table: Table) -> Numerals:
     if evidence.is_contrary:
         problem, found = "this number has another format than the others", f'"{text}"'
         expected = f"numbers with a decimal {'comma' if usual.decimal == ',' else 'point'}"
-        hint = "correct this cell; or, if all numbers of the file have this format, state "
-        hint += 'decimal = "..." and thousands = "..." in the campaign'
+        hint = HINTS["decimal"]
     else:
         problem = "this number can be read in two ways"
         found = f'"{text}", and no other number in the file shows the decimal mark'

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from itertools import islice, pairwise
+from itertools import islice
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -92,15 +92,12 @@ def note_left_out(table: Table, rows: Sequence[FaultyRow], count: int) -> Iterat
         MeasurementError: so many of these rows look like data that the meaning of the table is in doubt.
     """
     left_out = [row for row in rows if not table.layout.is_repeated([str(cell) for cell in row[1]])]
-    if broken := _broken_rows(table, left_out):
-        problem = "rows are broken over two lines each"
-        found = ", ".join(f"lines {first} and {second}" for first, second in broken[:_MOST_LISTED])
-        expected = f"the {len(table.headers)} cells of a row on one line"
-        hint = "join these lines; tables that were copied from a PDF often have such broken rows"
-        raise table.error(problem, line=broken[0][0], found=found, expected=expected, hint=hint)
     in_doubt = [row for row in left_out if row[2] in ("doubtful", "word")]
     is_much = len(in_doubt) > _MOST_WORDS or sum(fault == "doubtful" for *_, fault in in_doubt) > 1
-    if is_much and len(in_doubt) > _MOST_LEFT_OUT * count and not _are_between_samples(in_doubt):
+    empty, lines = {tuple(cell == "" for cell in row[1]) for row in in_doubt}, np.array([row[0] for row in in_doubt])
+    complete = lines[1:][np.diff(lines) == 2]  # each k-th row, if another channel was sampled more slowly
+    are_between_samples = len(empty) == 1 and any(*empty) and complete.size > 2 and np.ptp(np.diff(complete)) == 0
+    if is_much and len(in_doubt) > _MOST_LEFT_OUT * count and not are_between_samples:
         raise bad_row(table, *in_doubt[0][:2], len(in_doubt))
     if left_out:
         listed = [
@@ -111,26 +108,6 @@ def note_left_out(table: Table, rows: Sequence[FaultyRow], count: int) -> Iterat
         more = ", ..." if len(left_out) > _MOST_LISTED else ""
         rows_text = f"{len(left_out)} row{'s' * (len(left_out) > 1)}"
         yield Caveat("rows_left_out", f"{rows_text} left out, without data: {', '.join(listed)}{more}")
-
-
-def _are_between_samples(rows: Sequence[FaultyRow]) -> bool:
-    """True if each k-th row of the file is complete, because one of its channels was sampled more slowly."""
-    lines = np.array([line for line, *_ in rows])
-    complete = lines[1:][np.diff(lines) == 2]
-    empty = {tuple(cell == "" for cell in cells) for _, cells, _ in rows}
-    return len(empty) == 1 and any(*empty) and complete.size > 2 and np.ptp(np.diff(complete)) == 0
-
-
-def _broken_rows(table: Table, rows: Sequence[FaultyRow]) -> list[tuple[int, int]]:
-    """Find rows that are broken over two lines: line numbers of successive lines whose cells together are one row."""
-    short = [(line, cells) for line, cells, fault in rows if fault == "doubtful" and "" in cells]
-    filled = [(line, sum(map(is_like_number, map(str, cells)))) for line, cells in short]
-    pairs = list[tuple[int, int]]()
-    for (first, count), (second, rest) in pairwise(filled):
-        is_used = bool(pairs) and pairs[-1][1] == first
-        if second == first + 1 and count + rest == len(table.headers) and not is_used:
-            pairs.append((first, second))
-    return pairs if len(pairs) > 1 else []
 
 
 def bad_row(
@@ -166,8 +143,9 @@ def bad_row(
         problem = "all rows have fewer cells than the header"
         return table.error(problem, line=line, found=found, expected=expected, hint=hint)
     problem = "the cell is empty" if cell == "" else "this is not a finite number, or beyond the range of every rig"
+    advice = "write each row on one line; tables copied from a PDF often have broken rows" if cell == "" else None
     expected = f"a number such as 12{table.numerals.decimal}5"
-    return table.error(problem, line=line, column=column, found=f'"{cell}"{also}', expected=expected)
+    return table.error(problem, line=line, column=column, found=f'"{cell}"{also}', expected=expected, hint=advice)
 
 
 def lost_formulas(table: Table) -> MeasurementError | None:

@@ -10,6 +10,7 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 from itertools import islice, zip_longest
+from typing import NamedTuple
 
 from bushfit import units
 from bushfit.reading.blocks import find_segments
@@ -32,6 +33,15 @@ _PAIR = re.compile(
 )
 #: First rows that show whether a column names quantities; chosen: more than a test has channels.
 _FIRST_ROWS = 50
+
+
+class KeyedValue(NamedTuple):
+    """Value of a named quantity in a row with some keys, such as a frequency, at a line of the file."""
+
+    number: int
+    keys: tuple[str | float, ...]
+    name: str
+    cell: str | float
 
 
 def reshape_table(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> Sheet | None:
@@ -86,60 +96,61 @@ def _spread_names(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> 
         return None
     name_column, width = max(names, key=lambda n: len(columns[n])), len(layout.headers)
     keys = [n for n in range(width) if n not in (name_column, values, unit)]
-    rows = list[tuple[int, list[str | float], str, str | float]]()
+    rows = list[KeyedValue]()
     for line in source.lines(layout.lines_before_data):
         cells = [*cells_of(line, layout.delimiter), *[""] * width]
         name = str(cells[name_column])
         name += f" [{cells[unit]}]" if unit is not None and cells[unit] else ""
-        rows.append((line.number, [cells[n] for n in keys], name, cells[values]))
-    several = len({name for _, _, name, _ in rows}) > 1
+        rows.append(KeyedValue(line.number, tuple(cells[n] for n in keys), name, cells[values]))
+    several = len({row.name for row in rows}) > 1
     return _spread(source, layout, [layout.headers[n] for n in keys], rows) if several else None
 
 
 def _join_blocks(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> Sheet | None:
-    """Join blocks one below the other that have a first column, such as the time, in common."""
-    if len(layout.headers) != 2 or len(vocabulary.roles(layout.headers)) < 2:
+    """Join blocks one below the other that have all columns but the last in common, such as the time."""
+    roles, width = vocabulary.roles(layout.headers), len(layout.headers)
+    if len(roles) < max(2, width - 1) or is_test(roles):
         return None
-    headers = list[Sequence[str]]([layout.headers])
-    rows = list[tuple[int, list[str | float], str, str | float]]()
+    headers, rows = list[Sequence[str]]([layout.headers]), list[KeyedValue]()
     for line in source.lines(layout.lines_before_data):
         cells = cells_of(line, layout.delimiter)
-        texts = list(map(str, cells))
-        if len(texts) == 2 and is_row(texts):
-            rows.append((line.number, [cells[0]], headers[-1][1], cells[1]))
-        elif len(texts) == 2 and texts[0] == layout.headers[0] and texts not in headers:
+        texts = tuple(map(str, cells))
+        if len(texts) == width and is_row(texts):
+            rows.append(KeyedValue(line.number, tuple(cells[:-1]), headers[-1][-1], cells[-1]))
+        elif len(texts) == width and texts[:-1] == layout.headers[:-1] and texts not in headers:
             headers.append(texts)
-    return _spread(source, layout, [layout.headers[0]], rows) if len(headers) > 1 else None
+    return _spread(source, layout, layout.headers[:-1], rows) if len(headers) > 1 else None
 
 
-def _spread(
-    source: RowSource,
-    layout: Layout,
-    keys: Sequence[str],
-    rows: Sequence[tuple[int, Sequence[str | float], str, str | float]],
-) -> Sheet:
-    """Make one row of the rows with equal keys, with a column for each quantity that they name.
+def spread(
+    keys: Sequence[str], values: Sequence[KeyedValue]
+) -> tuple[list[str], list[int], list[Sequence[str | float]]]:
+    """Make one row of the values with equal keys, with a column for each quantity that they name.
 
     Args:
-        source: lines or rows of the file.
-        layout: layout of the file.
         keys: headers of the columns with the keys, such as the frequency.
-        rows: line number, keys, name of the quantity, and value of each row.
+        values: values in the order of the file.
 
     Returns:
-        Sheet with the lines above the table, a header, and the rows in the order of their first values; a quantity that
-        occurs again with equal keys begins a further row.
+        Headers, and line number and cells of each row, in the order of their first values; a quantity that occurs again
+        with equal keys begins a further row.
     """
-    names = list(dict.fromkeys(name for _, _, name, _ in rows))
-    spread = dict[tuple[tuple[str | float, ...], int], list[str | float]]()
-    counts = dict[tuple[tuple[str | float, ...], str], int]()
-    for _, key, name, value in rows:
-        repeat = counts[tuple(key), name] = counts.get((tuple(key), name), 0) + 1
-        row = spread.setdefault((tuple(key), repeat), [*key, *[""] * len(names)])
-        row[len(key) + names.index(name)] = value
+    names = list(dict.fromkeys(value.name for value in values))
+    rows = dict[tuple[Sequence[str | float], int], tuple[int, list[str | float]]]()
+    counts = Counter[tuple[Sequence[str | float], str]]()
+    for number, key, name, cell in values:
+        counts[key, name] += 1
+        _, row = rows.setdefault((key, counts[key, name]), (number, [*key, *[""] * len(names)]))
+        row[len(key) + names.index(name)] = cell
+    return [*keys, *names], [number for number, _ in rows.values()], [row for _, row in rows.values()]
+
+
+def _spread(source: RowSource, layout: Layout, keys: Sequence[str], values: Sequence[KeyedValue]) -> Sheet:
+    """Sheet with the lines above a table, and the rows of `spread`."""
     above = [line.content for line in source.head if line.number < layout.header_line]
     above = [[content] if isinstance(content, str) else content for content in above]
-    return Sheet(source.sheet or "", [*above, [*keys, *names], *spread.values()])
+    headers, _, rows = spread(keys, values)
+    return Sheet(source.sheet or "", [*above, headers, *rows])
 
 
 def _exchange_rows(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> Sheet | None:

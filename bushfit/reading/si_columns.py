@@ -104,8 +104,8 @@ def si_column(table: Table, role: str, tested: Place, hint: str | None = None) -
         hint += f', or units = {{ {role} = "{second}" }}' if second and not size else ""
     elif not units.is_compatible(unit, expected) and units.is_compatible(unit, "V"):  # pint is slow to import
         problem = f"the {label} is in volts"
-        hint = f"state the {label} of one volt, such as "
-        hint += f'units = {{ {role} = "{quantity_above(table, expected) or f"200 {example}"}" }} in the campaign'
+        hint = f"state the {label} of one volt: "
+        hint += f'units = {{ {role} = "{quantity_above(table, expected) or f"... {example}"}" }} in the campaign'
     if problem:
         raise UnitError(problem, file=table.file, place=place, found=f'"{column.header}"', expected=wanted, hint=hint)
     foreign_units = ("m", "rad", "N/m", "N*m/rad") if table.motion is STRAINING else ("1", "Pa")
@@ -135,23 +135,23 @@ def columns_key(table: Table, role: str, unit: str) -> str:
     Returns:
         Keys for up to three unused headers with a unit of this dimension.
     """
-    usual = Vocabulary({**LOOP_COLUMNS, **SWEEP_COLUMNS})
-    fitting = [
-        header
+    names = {**LOOP_COLUMNS, **SWEEP_COLUMNS}
+    usual, with_unit = Vocabulary(names), Vocabulary({role: names.get(role, ())}, {}, {role: unit})
+    own_names, example = [(role, role), ("amplitude", "displacement")], units.common_unit(unit)[1]
+    unused = [
+        (header, parse_unit(in_row)[0] or split_unit(header)[1] or "1")
         for header, in_row in zip(table.headers, table.layout.units, strict=True)
-        if header
-        and (
-            not (heading := usual.heading(header))
-            or heading.role == role
-            or (role, heading.role) == ("amplitude", "displacement")
-        )
-        and unit != "1"
-        and units.is_compatible(split_unit(header)[1] or parse_unit(in_row)[0], unit)
+        if header and (not (heading := usual.heading(header)) or (role, heading.role) in own_names)
     ]
-    shared = ", or the sum of both in one column if two load cells share the load" * (
-        role == "force" and len(fitting) > 1
-    )
-    return " or ".join(f'columns = {{ {role} = "{header}" }}' for header in fitting[:3] or ["..."]) + shared
+    fitting, volts = ([text for text, one in unused if units.is_compatible(one, si)] for si in (unit, "V"))
+    fitting, volts = [] if unit == "1" else fitting, volts if role in LOOP_COLUMNS else []
+    key = " or ".join(f'columns = {{ {role} = "{header}" }}' for header in (fitting or volts)[:3] or ["..."])
+    if role == "force" and len(fitting) == 2:
+        return f"{key} if this cell carries the load alone, or write the sum into a column if both share the load"
+    if fitting or volts:
+        return key if fitting else f'{key}, and the size of one volt: units = {{ {role} = "... {example}" }}'
+    is_named = any(map(with_unit.heading, filter(None, table.headers)))
+    return f'units = {{ {role} = "{example}" }}' if is_named else key
 
 
 def refuse_other_motion(table: Table, role: str, headers: Sequence[str] | None = None) -> None:

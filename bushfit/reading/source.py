@@ -155,7 +155,7 @@ def _non_empty_lines(data: io.BytesIO, after: int) -> Iterator[Line]:
             if len(line) > LONGEST_LINE:
                 found = f"a line of {len(line)} characters"
                 raise MeasurementError("the table cannot be read", place=f"line {number}", found=found)
-            if line.strip(" \t\r\n,;|^"):
+            if line.strip(" \t\r\n,;|^+-=:"):
                 yield Line(number, line.rstrip("\n"))
 
 

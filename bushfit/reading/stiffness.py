@@ -8,7 +8,7 @@ import numpy as np
 
 from bushfit import units
 from bushfit.caveat import Caveat
-from bushfit.reading.headers import Column, Vocabulary
+from bushfit.reading.headers import HINTS, Column, Vocabulary
 from bushfit.reading.measurement import Complex, Floats
 from bushfit.reading.roles import AGREEING_PAIRS, CONVERSIONS, OF_MOTION, PAIRS
 from bushfit.reading.si_columns import refuse_other_motion
@@ -221,8 +221,7 @@ def check_stiffness(
         column,
         "no bushing has this loss",
         f"a loss factor (loss over storage stiffness) from {low:g} to {high:g}",
-        f"check the unit: a phase in deg or rad, a loss factor in % or as a ratio [-]{other_unit}; or is the "
-        "phase 90 deg minus the loss angle? Beyond the resonance of a moving mass, delete the rows from the file",
+        f"check the unit: a phase in deg or rad, a loss factor in % or as a ratio [-]{other_unit}; {HINTS['loss']}",
     )
     for redundant_pair in AGREEING_PAIRS:
         if redundant_pair == pair or not set(redundant_pair) <= set(values):

@@ -15,10 +15,10 @@ from bushfit.caveat import Caveat
 from bushfit.geometry import Place, strain_factor_of_files
 from bushfit.reading.block_labels import note_coupon
 from bushfit.reading.finding import find_table
-from bushfit.reading.headers import SWEEP_COLUMNS, WORDS, ZERO_TO_PEAK, AmplitudeConvention, Column
+from bushfit.reading.headers import HINTS, SWEEP_COLUMNS, WORDS, ZERO_TO_PEAK, AmplitudeConvention, Column
 from bushfit.reading.labelled import Rows, column_texts, note_not_understood
 from bushfit.reading.levels import rows_of_test
-from bushfit.reading.measurement import Floats, Sweep
+from bushfit.reading.measurement import Complex, Floats, Sweep
 from bushfit.reading.parts import OpenedFile
 from bushfit.reading.rejected import check_positive
 from bushfit.reading.roles import AGREEING_PAIRS, si_unit
@@ -40,12 +40,10 @@ _FEWEST_SWEEP_ROWS = 3
 _MOST_REPEATS = 1_000_000
 #: Relative difference up to which a stated amplitude or frequency agrees with its column; chosen: rigs miss by less.
 _STATED_AGREEMENT = 0.1
+#: Largest difference of ln |K| of repeats at one amplitude and frequency; chosen: mountings differ by less.
+_LARGEST_REPEAT = 0.03
 #: Name of an amplitude that may be peak-to-peak: a stroke, unless it is called its amplitude.
 _STROKE = re.compile("|".join(WORDS["counting"]["stroke"]), re.IGNORECASE)
-_HINTS = {
-    "amplitude": 'or state at_amplitude = "0.1 mm" if all rows have it',
-    "frequency": 'or state at_frequency = "10 Hz" if all rows have it',
-}
 
 
 def read_sweep(
@@ -115,6 +113,8 @@ def read_sweep(
     frequency, amplitude = frequency[selected], values["amplitude"][selected]
     reached = values["amplitude_reached"][selected] if "amplitude_reached" in values else None
     runs = runs_of(frequency, amplitude, None if repeat is None else repeat[selected], test.stepped)
+    for role in constants.keys() - columns.keys() if repeat is None else ():
+        _refuse_several_levels(table, role, (frequency, amplitude), runs.repeat, stiffness[selected])
     if "amplitude" in columns and columns["amplitude"].role == "force_amplitude":
         runs = Runs(None, amplitude, runs.repeat)  # no amplitude is kept under a force that is
     if reached is None and not np.array_equal(runs.amplitude, amplitude):
@@ -168,7 +168,7 @@ def sweep_columns(
     wanted += ["stiffness"] if "amplitude" in roles and roles["amplitude"].role == "force_amplitude" else []
     redundant = (role for other_pair in AGREEING_PAIRS if set(other_pair) <= set(roles) for role in other_pair)
     wanted += [role for role in redundant if table.agrees(role, si_unit(role, direction.motion))]
-    columns = {role: si_column(table, role, direction, _HINTS.get(role)) for role in wanted}
+    columns = {role: si_column(table, role, direction, HINTS.get(role)) for role in wanted}
     amplitude, force = columns.get("amplitude"), columns.get("force_amplitude")
     in_header, expected, problem = amplitude.convention if amplitude else None, "p-p, rms or 0-p in the header", ""
     used = in_header or convention or "zero-to-peak"
@@ -205,6 +205,37 @@ def _copied_rows(points: Sequence[Floats], values: Collection[Floats]) -> NDArra
     groups = pd.DataFrame(dict(enumerate(points))).groupby([0, 1])
     copied = pd.DataFrame(dict(enumerate(values))).duplicated()
     return np.asarray(copied & (groups[0].transform("size") > groups.size().median()))
+
+
+def _refuse_several_levels(
+    table: Table, role: str, points: Sequence[Floats], run: NDArray[np.int64], stiffness: Complex
+) -> None:
+    """Refuse one stated amplitude or frequency if the runs of a file differ by more than repeats.
+
+    Args:
+        table: table of the sweep.
+        role: "amplitude" or "frequency".
+        points: frequency and amplitude of each row, (n,) each.
+        run: number of the run of each row, (n,).
+        stiffness: complex stiffness of each row, (n,).
+
+    Raises:
+        MeasurementError: the mean stiffness of two runs over equal points differs by more than 3 %.
+    """
+    import pandas as pd
+
+    size = pd.Series(np.log(np.abs(stiffness)))
+    offsets = (size - size.groupby([*points]).transform("mean")).groupby(run).mean()
+    begins_again = any(np.unique(x).size > 2 and np.abs(np.diff(x)).max() == np.ptp(x) for x in points)
+    if begins_again and (difference := float(np.ptp(offsets))) > _LARGEST_REPEAT:
+        raise table.header_error(
+            f"one {role} is stated, but this file may have several",
+            found=f"{offsets.size} runs over the same points, whose stiffness differs by {100 * difference:.2g} %",
+            expected=f"the {role} of each run",
+            hint=f"{HINTS['level_of_blocks']} at_{role}"
+            if "block" in table.headers
+            else f"add a column for the {role}",
+        )
 
 
 def _repeat_numbers(table: Table, values: Mapping[str, Floats]) -> NDArray[np.int64] | None:

@@ -9,23 +9,22 @@ cell ("K* 0.1 mm [N/mm]") or in several. Of merged header cells only the leftmos
 """
 
 import re
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import accumulate
+from itertools import accumulate, chain
 from pathlib import Path
 from typing import NamedTuple
 
 from bushfit import units
 from bushfit.caveat import Caveat
 from bushfit.errors import MeasurementError
-from bushfit.geometry import Direction
 from bushfit.reading.blocks import find_segments
 from bushfit.reading.headers import COUNTED, AmplitudeConvention, Vocabulary, split_convention
 from bushfit.reading.layout import Layout
 from bushfit.reading.lines import Line, is_comment, is_row, is_summary_row, is_units_row
 from bushfit.reading.names import named_direction
 from bushfit.reading.numerals import is_like_number, plainest_value
+from bushfit.reading.reshape import KeyedValue, spread
 from bushfit.reading.roles import CONDITIONS
 from bushfit.reading.source import RowSource, Sheet, cells_of
 
@@ -85,11 +84,13 @@ class _WideColumn(NamedTuple):
         meaning: meaning of its headers.
         down: meaning of the first column of its block.
         points: for each row, its line number, the cell of the first column, and the cell of this column.
+        direction: direction in a title above its block, or above an earlier one; "" without any.
     """
 
     meaning: _Meaning
     down: _Meaning
     points: list[tuple[int, str | float, str | float]]
+    direction: str = ""
 
 
 def unpivot(source: RowSource, layout: Layout, file: Path, vocabulary: Vocabulary) -> tuple[RowSource, Layout] | None:
@@ -105,7 +106,7 @@ def unpivot(source: RowSource, layout: Layout, file: Path, vocabulary: Vocabular
         Source and layout of the long table; None if the file has no wide table.
 
     Raises:
-        MeasurementError: the blocks have different frequencies or amplitudes, or do not state their quantity.
+        MeasurementError: a block does not state its quantity, or blocks differ in the unit of their levels.
     """
     roles, mark = [heading.role for cell in layout.headers if (heading := vocabulary.heading(cell))], layout.delimiter
     is_long = len(roles) > 2 and len(set(roles)) == len(roles) and not set(roles).isdisjoint(_STEPPED)
@@ -113,44 +114,35 @@ def unpivot(source: RowSource, layout: Layout, file: Path, vocabulary: Vocabular
     if (is_long and not has_merged_titles) or len(layout.headers) > _MOST_COLUMNS:
         return None
 
-    def first_number(line: Line) -> int | None:
-        """Index of the first filled cell if a row has only numbers; None for any other line."""
+    def is_numbers(line: Line) -> bool | None:
+        """True for a row of numbers, which begins with a number; None for any other line."""
         texts = list(map(str, line.content))
-        first = next((column for column, text in enumerate(texts) if text), 0)
-        return first if is_row(texts) and is_like_number(texts[first]) else None
+        return (is_row(texts) and is_like_number(next(filter(None, texts)))) or None
 
     cells = [(line.number, cells_of(line, mark)) for line in source.head if not is_comment(line.content, mark)]
     width = max((len(row) for _, row in cells), default=0)
     lines = [Line(number, [*row, *[""] * (width - len(row))]) for number, row in cells]
-    columns, texts, directions = list[_WideColumn](), list[str](), dict[Direction, None]()
-    for above, rows in find_segments(lines, first_number, fewest_rows=2):
+    columns, texts, direction = list[_WideColumn](), list[str](), None
+    for above, rows in find_segments(lines, is_numbers, fewest_rows=2):
         headers = [list(map(str, line.content)) for line in above[-_MOST_HEADER_ROWS:]]
         if not (rows and headers):
             continue
         if len(headers) > 1 and is_units_row(headers[-1]):  # the unit of an amplitude may be that of a stiffness
             named = zip(headers[-2], headers.pop(), strict=True)
             headers[-1] = [f"{name} [{unit}]" if name and unit else name or unit for name, unit in named]
+        titles = (line.text for line in above if len(line.text.split()) <= _LONGEST_TITLE)
+        direction = next(filter(None, (named_direction([title]) for title in titles)), direction)
         corners = [[m.stepped for m in _read_corner(cell, vocabulary) if not m.level] for cell in headers[-1]]
-        start = first_number(rows[0]) or 0
+        start = next(n for n, cell in enumerate(rows[0].content) if cell != "")
         repeated = [n for n in range(start + 1, width) if any(corners[n]) and corners[n] == corners[start]]
         for side in map(slice, [start, *repeated], [*repeated, width]):
             data = [Line(row.number, row.content[side]) for row in rows]
-            columns += _read_block([row[side] for row in headers], data, vocabulary)
+            block = _read_block([row[side] for row in headers], data, vocabulary)
+            columns += [column._replace(direction=str(direction or "")) for column in block]
         texts += [text for row in headers for text in row]
-        titles = [line.text for line in above if len(line.text.split()) <= _LONGEST_TITLE]
-        directions |= dict.fromkeys(direction for title in titles if (direction := named_direction([title])))
     if not columns:
         return None
-    if len(directions) > 1:
-        raise MeasurementError(
-            "the titles of the tables name several directions",
-            file=file,
-            place=f'sheet "{source.sheet}"' if source.sheet else None,
-            found=" and ".join(directions),
-            expected="tables of one direction",
-            hint="write the tables of each direction into a sheet or file of their own",
-        )
-    sheet, long_layout = _long_table(columns, source, file, vocabulary)
+    sheet, long_layout = _long_table(columns, texts, source, file, vocabulary)
     summaries = [text for text in dict.fromkeys(texts) if is_summary_row([text])]
     left_out = (f'the column "{text}" is left out, because it summarizes other columns' for text in summaries)
     notes = tuple(Caveat("summary_column", sentence) for sentence in left_out)
@@ -270,59 +262,51 @@ def _role_of_unit(unit: str | None) -> str | None:
 
 
 def _long_table(
-    columns: Sequence[_WideColumn], source: RowSource, file: Path, vocabulary: Vocabulary
+    columns: Sequence[_WideColumn], texts: Sequence[str], source: RowSource, file: Path, vocabulary: Vocabulary
 ) -> tuple[RowSource, Layout]:
     """Build a long table (a row per frequency and amplitude) from all blocks of a wide table, with its layout.
 
     Args:
         columns: columns of all blocks.
+        texts: header cells of all blocks, for errors.
         source: lines or rows of the file.
         file: path, for errors.
         vocabulary: known column names, by which a header has a role such as "force".
 
     Raises:
-        MeasurementError: a block does not state its quantity, blocks differ in their frequencies or amplitudes, or a
-            quantity has two units.
+        MeasurementError: a block does not state its quantity, or frequencies or amplitudes have two units.
     """
-    by_role: dict[str | None, list[_WideColumn]] = {column.meaning.role: [] for column in columns}
-    for column in sorted(columns, key=lambda column: plainest_value(column.meaning.level or "")):
-        by_role[column.meaning.role].append(column)
-    steps = [
-        [[plainest_value(str(cell)) for cell in (m.level, *(row[1] for row in points))] for m, _, points in block]
-        for block in by_role.values()
+    columns = sorted(columns, key=lambda column: plainest_value(column.meaning.level or ""))
+    is_named = all(column.meaning.role for column in columns)
+    axes = [
+        dict.fromkeys((meaning.stepped, meaning.level_unit, meaning.convention) for meaning in meanings)
+        for meanings in zip(*((column.down, column.meaning) for column in columns), strict=True)
     ]
-    down = dict.fromkeys((meaning.stepped, meaning.level_unit, meaning.convention) for _, meaning, _ in columns)
-    across = dict.fromkeys((meaning.stepped, meaning.level_unit, meaning.convention) for meaning, *_ in columns)
-    quantities = dict.fromkeys((meaning.role, meaning.unit, None) for meaning, *_ in columns)
-    problem = None
-    if None in by_role:
-        problem = "the quantity of a block of this wide table is not stated"
-        expected = "a quantity such as K* [N/mm] or tan delta above each block, or in each header"
-    elif any(block != steps[0] for block in steps):
-        problem, expected = "the blocks of this wide table differ", "the same frequencies and amplitudes in all blocks"
-    elif len(down) > 1 or len(across) > 1 or len(quantities) > len(by_role):
-        problem = "this wide table states one quantity in two ways"
-        expected = "one unit for each quantity, and levels of the same kind"
-    if problem:
-        kinds = Counter((one.role, one.unit, one.stepped, len(points)) for one, _, points in columns)
-        found = (
-            f"{(role or 'not named').replace('_', ' ')}{f' [{unit}]' if unit else ''} of {count} "
-            f"{'frequencies' if stepped == 'frequency' else 'amplitudes'}, {rows} rows"
-            for (role, unit, stepped, rows), count in kinds.items()
+    if not is_named or any(len(axis) > 1 for axis in axes):
+        problem, expected = "this wide table states its levels in two ways", "one unit for each of them"
+        if not is_named:
+            problem = "the quantity of a block of this wide table is not stated"
+            expected = "a quantity such as K* [N/mm] or tan delta above each block, or in each header"
+        raise MeasurementError(
+            problem,
+            file=file,
+            place=f'sheet "{source.sheet}"' if source.sheet else f"line {columns[0].points[0][0] - 1}",
+            found=", ".join(dict.fromkeys(filter(None, texts))),
+            expected=expected,
+            hint="correct the wide table, or write a long table with one row for each frequency and amplitude",
         )
-        place = f'sheet "{source.sheet}"' if source.sheet else f"line {columns[0].points[0][0] - 1}"
-        hint = "correct the wide table, or write a long table with one row for each frequency and amplitude"
-        raise MeasurementError(problem, file=file, place=place, found="; ".join(found), expected=expected, hint=hint)
-    headers = tuple(
+
+    several, rows = len({column.direction for column in columns}) > 1, list[KeyedValue]()
+    for meaning, _, points, direction in columns:
+        level, name = meaning.level or "", vocabulary.name_of(meaning.role or "")
+        further = (level if _GROUPED.fullmatch(level) else plainest_value(level), *[direction] * several)
+        name += f" [{meaning.unit}]" if meaning.unit else ""
+        rows += [KeyedValue(number, (first, *further), name, cell) for number, first, cell in points]
+    names = (
         f"{vocabulary.name_of(role or '')}{COUNTED[convention]}{f' [{unit}]' if unit else ''}"
-        for role, unit, convention in (*down, *across, *quantities)
+        for role, unit, convention in chain(*axes)
     )
-    numbers, content = list[int](), list[list[str | float]]()
-    for block in zip(*by_role.values(), strict=True):
-        text = block[0].meaning.level or ""
-        level = text if _GROUPED.fullmatch(text) else plainest_value(text)
-        for points in zip(*(column.points for column in block), strict=True):
-            numbers.append(points[0][0])
-            content.append([points[0][1], level, *(cell for *_, cell in points)])
-    layout = Layout("", headers, min(numbers) - 1, ("",) * len(headers), None)
+    keys = [*names, *["direction"] * several]
+    headers, numbers, content = spread(keys, rows)
+    layout = Layout("", tuple(headers), min(numbers) - 1, ("",) * len(headers), None)
     return Sheet(source.sheet or "", content, numbers=numbers), layout
