@@ -26,11 +26,11 @@ from bushfit.model.covariance import Z95
 
 #: Candidate sizes, relative to |K|: from the repeatability of the best rigs to far beyond any acceptable fit.
 SIZES = np.geomspace(1e-3, 0.4, 25)
-#: Candidate lengths, in ln frequency and in ln strain: from the distance of neighbouring points to a decade.
-OVER_FREQUENCY, OVER_STRAIN = (0.15, 0.4, 0.9, 2.0), (0.4, 0.9, 2.0)
 #: Lengths of the deviation of a rubber from a few parameters: relaxation takes decades of frequency, and breakdown more
 #: than one of strain.
 COMPOUND_LENGTHS = (8.0, 3.0)
+#: Candidate lengths, in ln frequency and in ln strain: from the distance of neighbouring points to `COMPOUND_LENGTHS`.
+OVER_FREQUENCY, OVER_STRAIN = (0.15, 0.4, 1.0, 3.0, 8.0), (0.4, 1.0, 3.0)
 #: Smallest likelihood, relative to the largest, of a process that enters the average; chosen for time.
 _COUNTS = 0.05
 #: Smallest number of degrees of freedom of a size: Student's t of fewer has no variance.
@@ -282,7 +282,7 @@ def average_processes(processes: Sequence[Discrepancy]) -> Unnamed:
 
 
 def candidate_processes(tests: FittedTests) -> list[Discrepancy]:
-    """Build the 12 or 24 Gaussian processes that may describe a model's misfit, to be compared by likelihood.
+    """Build the 15 or 30 Gaussian processes that may describe a model's misfit, to be compared by likelihood.
 
     For each pair of correlation lengths, in ln frequency and in ln strain, the list has two processes: one error for
     all directions, and independent errors of the directions.
