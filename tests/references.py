@@ -1,7 +1,7 @@
 """Results of commands as lines of text, and their comparison with stored references.
 
-A line of data is `name = values`, compared relative to its largest value. A line of text begins with `|`; its words are
-compared exactly and its numbers with a tolerance.
+A line of data is `name = values` or `name = value ± standard error`, compared relative to its largest number. In other
+lines, words are compared exactly and numbers with a tolerance.
 """
 
 import difflib
@@ -22,6 +22,8 @@ from bushfit.report.plots.style import to_image
 #: Values shown of a long column, entries of a long list, and lines of a long text, evenly spaced.
 VALUES, ENTRIES, LINES = 4, 6, 200
 NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
+#: Name, values, numbers of values, mean and root mean square of a line of data.
+DATA_LINE = re.compile(r"(?!\|)(.+?) = ([-+.\de ]+?)(?: \((\d+ of \d+) values, mean (\S+), rms (\S+)\))?(?: ± \S+)?")
 #: Keys, columns and texts that differ from run to run or from release to release.
 CHANGING = re.compile(r"seconds|key|inputs|version|sha256|provenance")
 CHANGING_TEXT = re.compile(
@@ -58,11 +60,21 @@ def is_numeric(values: list[Any]) -> bool:
     return all(isinstance(value, int | float | None) and not isinstance(value, bool) for value in values)
 
 
+def scaled(covariance: dict[str, Any]) -> dict[str, Any]:
+    """A covariance and its changes relative to standard errors, to four decimals; smaller changes are rounding."""
+    size = np.sqrt(np.diag(covariance["matrix"]))
+    size[size == 0.0] = 1.0
+    parts = {key: part / np.outer(size, size) for key in ("matrix", "spread") if (part := covariance[key])}
+    return covariance | {key: (part.round(4) + 0.0).tolist() for key, part in parts.items()}
+
+
 def document_lines(name: str, value: Any) -> Iterator[str]:
     """Lines of a JSON document: one for each list of numbers and each other value, after its path."""
     if isinstance(value, dict):
-        for key, part in value.items():
-            if not CHANGING.search(key):
+        for key, part in (scaled(value) if "matrix" in value else value).items():
+            if key == "value" and value.get("stderr"):
+                yield f"{numbers_line(f'{name}.value', [part])} ± {value['stderr']:.6g}"
+            elif not CHANGING.search(key):
                 yield from document_lines(f"{name}.{key}", part)
     elif isinstance(value, list) and value and is_numeric(value):
         yield numbers_line(name, value)
@@ -150,15 +162,21 @@ def agree(expected: str, obtained: str) -> bool:
     """Whether the numbers of two lines with equal words agree; the last printed digit of a text may differ by one."""
     if expected == obtained:
         return True
+    lines = [DATA_LINE.fullmatch(line) for line in (expected, obtained)]
+    if all(lines):
+        (name, values, count, *means), other = (line.groups(default="") for line in lines)
+        old, new = (np.array(" ".join(texts).split(), float) for texts in ((values, *means), (other[1], *other[3:])))
+        least = 1.0 if ".covariance." in name else float(expected.partition(" ± ")[2] or 0.0)
+        scale = np.abs(old).max(initial=least)
+        tolerance = DERIVED if DERIVATIVES.search(name) else DATA
+        alike = count == other[2] and agree(f"| {name}", f"| {other[0]}")
+        return alike and bool(np.all(np.abs(new - old) <= tolerance * scale + 1e-12))
     texts = NUMBER.findall(expected)
     old, new = (np.clip(np.array(numbers, float), -1e99, 1e99) for numbers in (texts, NUMBER.findall(obtained)))
-    if expected.startswith("|"):
-        parts = [text.lower().partition("e") for text in texts]
-        digits = np.array([len(number.partition(".")[2]) - int(exponent or 0) for number, _, exponent in parts], float)
-        last = np.maximum(1.01 * 10.0 ** np.clip(-digits, -99, 99), 1e-12)  # less is rounding of zero
-        return bool(np.all(np.isclose(new, old, PRINTED, last)))
-    tolerance = DERIVED if DERIVATIVES.search(expected) else DATA
-    return bool(np.all(np.isclose(new, old, 0.0, tolerance * np.abs(old).max(initial=0.0) + 1e-12)))
+    parts = [text.lower().partition("e") for text in texts]
+    digits = np.array([len(number.partition(".")[2]) - int(exponent or 0) for number, _, exponent in parts], float)
+    last = np.maximum(1.01 * 10.0 ** np.clip(-digits, -99, 99), 1e-12)  # less is rounding of zero
+    return bool(np.all(np.isclose(new, old, PRINTED, last)))
 
 
 def check(obtained: Path, expected: Path) -> None:

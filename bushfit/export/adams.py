@@ -153,7 +153,8 @@ def _property_file(
     for element in elements:
         displacement, force = _SCALES[element.reference.direction.motion]
         scale = force / displacement if kind == "car" else float(np.degrees(1.0))
-        curve = np.stack((element.curve.displacement * displacement, element.curve.mean.value * force), axis=1)
+        # rounded, or zero becomes 1e-15, of either sign
+        curve = np.stack((element.curve.displacement * displacement, element.curve.mean.value * force), 1).round(9)
         for dof in DOFS[element.reference.direction]:
             damping[dof - 1], curves[dof - 1] = scale * element.damping[kind], curve
     if (stated := request.cardanic) is not None:

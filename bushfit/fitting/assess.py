@@ -31,8 +31,8 @@ from bushfit.units import CELSIUS, format_range, number
 
 #: Distance of the reduced chi-square from 1 beyond which noise alone is no explanation, in standard deviations.
 _LACK_OF_FIT = 5.0
-#: Standard error given to a combination of parameters that the data leave open, in coordinates, which are of order
-#: one: beyond all bounds, and small enough to cancel where a quantity does not depend on the combination.
+#: Standard error of a combination of parameters that the data leave open, in coordinates, which are of order one:
+#: beyond all bounds, and small enough to cancel where a quantity does not depend on the combination.
 _LARGEST_ERROR = 1e3
 #: Shear moduli of rubber [Pa], with room: from the softest gel of a mount to the hardest compound at small strain.
 _SOFTEST, _HARDEST = 5e4, 1e8
@@ -69,7 +69,8 @@ def covariance(
         Let d be the errors of all parameters. Each stage solves J_s (J_s^T d_s + J_r^T d_r + noise) = 0 for its
         parameters s, while the remaining parameters r have the errors of other stages. With J_s^T = Q R this is Q^T J^T
         d = b, cov(b) = 1, which never squares the Jacobian. Stacked over the stages it is M d = b, so that cov(d) =
-        (M^-1 B) (M^-1 B)^T with cov(b) = B B^T. Singular values of M below 1/_LARGEST_ERROR are lifted to it.
+        (M^-1 B) (M^-1 B)^T with cov(b) = B B^T. J has a row more for each parameter: a prior of the standard error
+        _LARGEST_ERROR, which a combination has that the data leave open, and which rounding does not change.
     """
     fixed, stages = fixed or Covariance(), [stage for stage in stages if stage.names]
     fixed = fixed.restricted([name for name in fixed.names if name not in model.tied])
@@ -82,6 +83,7 @@ def covariance(
     for stage in stages:
         equations = slice(begin, begin + len(stage.names))
         slope = FitProblem(model, stage.tests, names).linearise(model)[1]
+        slope = np.concatenate((slope, np.eye(len(names))[:, equations] / _LARGEST_ERROR), axis=1)
         basis = np.linalg.qr(slope[equations].T)[0]
         system[equations] = basis.T @ slope.T
         excess = np.ones(len(basis))  # 1 in the rows of priors
@@ -94,7 +96,7 @@ def covariance(
         root[equations, equations] = np.linalg.qr(share.T)[1].T
         bases.append((equations, share, blocks))
         begin = equations.stop
-    reaction = _inverse(system)
+    reaction = np.linalg.inv(system)
     by_value, reaction = (reaction @ root) * slopes[:, None], reaction * slopes[:, None]
     carried = reaction[:, : len(fixed.names)] / slopes[: len(fixed.names)]
     matrix, spread = by_value @ by_value.T, [carried @ part @ carried.T for part in fixed.spread]
@@ -154,12 +156,6 @@ def _changes_by_noise(
     return {variance: (first, second - lost @ lost.T) for variance, (first, second, lost) in sums.items()}
 
 
-def _inverse(system: Array) -> Array:
-    """Inverse of a square matrix, (k, k), that may be singular; singular values of the inverse are at most 1000."""
-    left_vectors, values, right_vectors = np.linalg.svd(system)
-    return (right_vectors.T / np.maximum(values, 1.0 / _LARGEST_ERROR)) @ left_vectors.T
-
-
 def linear_errors(slope: Array) -> Array:
     """Standard errors of k parameters in their dimensionless coordinates (mostly ln value), (k,).
 
@@ -168,7 +164,8 @@ def linear_errors(slope: Array) -> Array:
     Args:
         slope: derivatives of the n whitened residuals with respect to the coordinates, (k, n).
     """
-    return np.linalg.norm(_inverse(np.linalg.qr(slope.T)[1]), axis=1)
+    root = np.linalg.qr(np.concatenate((slope.T, np.eye(len(slope)) / _LARGEST_ERROR)))[1]
+    return np.linalg.norm(np.linalg.inv(root), axis=1)
 
 
 def reduced_chi_square(model: Model, data_sets: Sequence[MeasuredTest], parameters: int) -> tuple[float, int]:

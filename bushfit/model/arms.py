@@ -256,12 +256,15 @@ def _fit(
     root = np.ones(omega.size)
     unit = np.abs(target).mean()
 
+    def moduli_of(x: Array) -> Array:
+        """Moduli [Pa] from their logs, (k,); steps that go too far are limited, as `exp` would give infinity or 0."""
+        return unit * np.exp(np.clip(x[:count], -100.0, 100.0))
+
     def parts(x: Array) -> tuple[Array, Array]:
         """Modulus of each arm relative to the total, and its derivative by ln(time), (n, k) each."""
         turn = 1j * omega[:, None] * np.exp(x[count:])
         basis = turn / (1.0 + turn)
-        # a step that goes too far is held, as `exp` would overflow
-        arm = basis * unit * np.exp(np.minimum(x[:count], 100.0)) / total[:, None]
+        arm = basis * moduli_of(x) / total[:, None]
         return arm, arm * (1.0 - basis)
 
     def residual(x: Array) -> Array:
@@ -282,7 +285,7 @@ def _fit(
         x = least_squares(residual, start, slopes, bounds=(low, high), max_nfev=200).x  # ten times what it takes
         error = np.abs(parts(x)[0].sum(axis=1) - target / total)
         if error.max() < best[0]:
-            best = error.max(), unit * np.exp(x[:count]), np.exp(x[count:])
+            best = error.max(), moduli_of(x), np.exp(x[count:])
         if error.max() < LEAST_ACCURACY:
             break
         root = root * np.sqrt(error / error.max() + 1e-3)  # a share stays where the error is 0
