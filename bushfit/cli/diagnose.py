@@ -131,7 +131,7 @@ def print_findings(output: Output, diagnosed: DiagnosisOutput) -> None:
     """Print the named effects with their sizes, the gap (rms residual / noise), its location, and the next test."""
     console, diagnosis, document = output.console, diagnosed.diagnosis, diagnosed.document
     for effect in document["effects"]:
-        _print_effect(output, effect)
+        _print_effect(output, effect, in_model=effect["name"] in diagnosis.result.model.effects)
     _print_gap(output, document)
     for title, regions in ((_WHERE, diagnosis.where), ("what remains", diagnosis.remainder)):
         if regions and not (title == "what remains" and diagnosis.remainder == diagnosis.where):
@@ -161,14 +161,17 @@ def _print_gap(output: Output, document: Mapping[str, Any]) -> None:
             output.console.print(f"  not held out: {part['part']}; {part['reason']}")
 
 
-def _print_effect(output: Output, effect: EffectEntry) -> None:
-    """Print one named effect: description, and the correction of a mistake in the record."""
+def _print_effect(output: Output, effect: EffectEntry, *, in_model: bool) -> None:
+    """Print one named effect: description, parameters unless the model has them, and the correction of a record."""
     from bushfit.effects.unnamed import effect_label
+    from bushfit.report.parameters import effect_sizes
 
     console = output.console
     test = f" in {effect['test']}" if effect["test"] else ""
     level = "bushing or rig" if effect["level"] == "unresolved" else effect["level"]
     name = effect_label(effect["name"])
     console.print(f"  [bold]{name}[/bold]{escape(test)} ({level}): {escape(effect['sentence'])}")
+    for parameter, value, interval in () if in_model else effect_sizes(effect):
+        console.print(f"    {parameter} = {value}, {f'95 % {interval}' if interval else 'no interval'}")
     if effect["correction"]:
         console.print(f"    correction in the campaign: {escape(effect['correction'])}")
