@@ -106,7 +106,7 @@ def command(files: tuple[Path, ...], levels: str | None, cycles: int, output: Ou
     results = [ResultFile("sweep", "table", points), ResultFile("reduce", "figure", figure)]
     output.write(folder, results, document, files)
     following = f"bushfit init {quote_path(folder / file)} --amplitude zero-to-peak"
-    output.print(f"for a campaign in {folder}:\n\n{snippet}\nnext, write a new campaign: {following}")
+    output.print(f"next, write a new campaign: {following}\nor write into a campaign in {folder}:\n\n{snippet}")
 
 
 def _resonance_table(file: Path, test_options: Mapping[str, Any], shaker: Mapping[str, Any]) -> Table | None:

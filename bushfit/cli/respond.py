@@ -75,7 +75,7 @@ def print_response(output: Output, response: ResponseOutput) -> None:
     """Print peak and rms force, power, largest strain and rate of each direction, and collect the warnings."""
     from bushfit.units import number
 
-    rows, duration = [], number(response.responses[0].history.step * response.time.size, 3)
+    rows, largest, duration = [], list[str](), number(response.responses[0].history.step * response.time.size, 3)
     for part in response.responses:
         unit, factor = part.direction.display.force
         strain, rate = (abs(values).max() for values in (part.strain, part.strain_rate))
@@ -84,7 +84,8 @@ def print_response(output: Output, response: ResponseOutput) -> None:
         strains = number(100.0 * strain, 3), shares[0], number(rate, 3), shares[1]
         power = f"{number(part.power, 3)} {'W/m^3' if part.direction.motion.force_unit == 'Pa' else 'W'}"
         rows.append((str(part.direction), *forces, power, *strains))
-    verdict = f"force up to {join_names(f'{row[1]} {row[0]}' for row in rows)} over {duration} s"
+        largest.append(f"{forces[0]} {part.label}")
+    verdict = f"force up to {join_names(largest)} over {duration} s"
     if all(part.tested for part in response.responses):
         share = max(max(part.shares_beyond) for part in response.responses)
         beyond = f"{number(100.0 * share, 2)} % of the time beyond the" if share else "within the"

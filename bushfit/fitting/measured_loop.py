@@ -232,6 +232,10 @@ class MeasuredLoop(MeasuredBase):
         """Absolute difference of model and measured force at rows with weight, relative to half the force range."""
         return np.abs(self.relative_difference(model)[0, self.weights > 0.0])
 
+    def largest_difference(self, model: Model, reference: Model) -> float:
+        """Largest difference between the forces of two models, relative to half the force range."""
+        return float(np.abs(self.response(model) - self.response(reference)).max() / self.half_range)
+
     def misfit(self, model: Model) -> Array:
         """Model minus measured force at each row, in units of the row's noise, (n,); 0 at rows without weight."""
         return self._difference(model) * self._per_noise

@@ -85,7 +85,7 @@ def test_a_parameter_on_a_bound_of_its_fit_passes_on_condition_and_is_named(type
     assert good["at bound"] == ""
     assert "mu (max)" in held["at bound"]
     assert "mu is at the max given in [fit]" in held["warnings"]
-    assert "at the max bound of the fit" in held["undecided limits"]
+    assert "max bound of the fit" in held["undecided limits"]
     assert "warning: at a bound of the fit, because the tests do not determine them: " in done.stderr
     assert "mu of b1" in done.stderr
     assert "b1 passes conditionally: mu 0.2 MPa" in done.stderr

@@ -59,7 +59,7 @@ def test_all_histories_of_a_direction_have_one_command(typed, root, tmp_path):
         (tmp_path / "lab" / name).write_bytes((root / "data" / source).read_bytes())
     (told,) = json.loads(typed("init", "lab", *GEOMETRY, "--direction", "axial", "--json").stdout)["left_out"]
     command = "bushfit reduce lab/raw_a.csv lab/raw_b.csv --direction axial"
-    assert told == f"2 raw stepped-sine histories, axial; {command} converts them to sweep.csv"
+    assert told == f"2 raw stepped-sine histories, axial; to convert them to sweep.csv: {command}"
 
 
 def coupon(model: Model, file: Path, strain: float) -> None:
