@@ -38,6 +38,7 @@ from bushfit.caveat import Caveat
 from bushfit.diagnosis import document
 from bushfit.effects.contract import Array
 from bushfit.errors import CampaignError
+from bushfit.fitting.model_error import BEYOND_NOISE
 from bushfit.reduction.arrays import median_and_scatter
 from bushfit.report.batch_document import LimitResult
 from bushfit.units import number, parse_quantity
@@ -48,8 +49,6 @@ RESULTS: Sequence[LimitResult] = ("pass", "conditional pass", "not judged", "con
 #: NRMSE above which a fit that misses its tests by more than noise is poor, unless the limits file states another value
 #: with `nrmse`. Chosen: half of the usual tolerance of a stiffness in drawings.
 POOR_FIT = 0.05
-#: Reduced chi-square from which noise alone does not explain a misfit.
-BEYOND_NOISE = 2.0
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -14,7 +14,7 @@ import numpy as np
 
 from bushfit.batch.comparison import FEWEST, capability, find_outliers, smallest_deviation, usual_parts
 from bushfit.batch.document import Estimate, RowFile
-from bushfit.batch.limits import BEYOND_NOISE, Limits, describe_poor_fit, judge_part, resolve_limits
+from bushfit.batch.limits import Limits, describe_poor_fit, judge_part, resolve_limits
 from bushfit.batch.manifest import Row
 from bushfit.batch.quantities import (
     FIT_NAMES,
@@ -31,6 +31,7 @@ from bushfit.caveat import Caveat, to_entries
 from bushfit.effects import is_parameter
 from bushfit.effects.contract import Array
 from bushfit.effects.unnamed import NAME as UNNAMED
+from bushfit.fitting.model_error import BEYOND_NOISE
 from bushfit.model.covariance import Z95
 from bushfit.reduction.arrays import median_and_scatter
 from bushfit.report.batch_document import BatchFile, PartTable, QuantityTable

@@ -169,8 +169,8 @@ def _print_effect(output: Output, effect: EffectEntry, *, in_model: bool) -> Non
     console = output.console
     test = f" in {effect['test']}" if effect["test"] else ""
     level = "bushing or rig" if effect["level"] == "unresolved" else effect["level"]
-    name = effect_label(effect["name"])
-    console.print(f"  [bold]{name}[/bold]{escape(test)} ({level}): {escape(effect['sentence'])}")
+    title = f"[bold]{effect_label(effect['name'])}[/bold]{escape(test)}"
+    console.print(f"  {title} ({level}): {escape(effect['sentence'])}")
     for parameter, value, interval in () if in_model else effect_sizes(effect):
         console.print(f"    {parameter} = {value}, {f'95 % {interval}' if interval else 'no interval'}")
     if effect["correction"]:

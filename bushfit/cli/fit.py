@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from bushfit.campaign.schema import Loss
     from bushfit.commands.fit import FitOutput
 
-#: Reduced chi-square from which a model misses its tests.
-_BEYOND_NOISE = 2.0
 #: Kinds of warnings that the model misses the tests.
 _MISFITS = {"misfit", "model_error", "given_values_miss", "unfitted_test_missed"}
 
@@ -123,13 +121,15 @@ def _print_and_write(
         inputs: files that the command has read.
         max_nrmse: misfit above which the command exits with status 1; None without a limit.
     """
+    from bushfit.fitting.model_error import BEYOND_NOISE
+
     campaign, result, file = fitted.data.campaign, fitted.result, quote_path(fitted.data.campaign.path)
     written = quote_path(folder / f"{fitted.files[0].name}.json")
     verdict, aim, words = "nothing was fitted: the tests are not compared", "predict from this model", ""
     by_kind = {warning.kind: warning.text for warning in result.warnings}
     misses = not _MISFITS.isdisjoint(by_kind)
     if quality := result.quality:
-        misses |= quality.reduced_chi_square >= _BEYOND_NOISE
+        misses |= quality.reduced_chi_square >= BEYOND_NOISE
         verdict = f"the model {'misses' if misses else 'meets'} the tests: NRMSE {number(100 * quality.nrmse, 2)} %"
         verdict += f", reduced chi-square {number(quality.reduced_chi_square, 3)} (1 is noise alone)"
         if misses:

@@ -264,10 +264,7 @@ def average_processes(processes: Sequence[Discrepancy]) -> Unnamed:
     share /= share.sum()
     freedom = float(share @ [process.likelihood.freedom(process.maximum[1]) for process in processes])
     wider = float(stdtrit(max(freedom, _MINIMUM_FREEDOM), 0.975)) / Z95
-    conditioned = list[tuple[Array, Array]]()
-    for process in processes:
-        conditioned.append(process.conditioned())
-    means, errors = zip(*conditioned, strict=True)
+    means, errors = zip(*(process.conditioned() for process in processes), strict=True)
     mean = share @ np.array(means)
     deviations = np.array([[np.square((one - mean).real), np.square((one - mean).imag)] for one in means])
     error = wider * np.sqrt(np.tensordot(share, np.square(errors) + deviations, 1))

@@ -228,10 +228,6 @@ class MeasuredLoop(MeasuredBase):
         """Model minus measured force at each row, relative to half the measured force range, (1, n)."""
         return (self._difference(model) / self.half_range)[None]
 
-    def relative_distance(self, model: Model) -> Array:
-        """Absolute difference of model and measured force at rows with weight, relative to half the force range."""
-        return np.abs(self.relative_difference(model)[0, self.weights > 0.0])
-
     def largest_difference(self, model: Model, reference: Model) -> float:
         """Largest difference between the forces of two models, relative to half the force range."""
         return float(np.abs(self.response(model) - self.response(reference)).max() / self.half_range)

@@ -60,7 +60,7 @@ _ENOUGH = 600
 #: Points from which on ripples over frequency are looked for as well.
 _DENSE = 300
 #: Relative error and reduced chi-square up to which a model meets its tests, as in `diagnose` and in `batch`.
-_SLIGHT_ERROR, _SLIGHT_MISFIT = 0.01, 2.0
+_SLIGHT_ERROR, BEYOND_NOISE = 0.01, 2.0
 #: Prior odds of something smooth that the model lacks, against nothing; as `diagnose` has them.
 _ODDS = 0.2
 #: Gain of the log likelihood by a process of middling lengths, up to which no others are tried; chosen: of clean
@@ -96,7 +96,7 @@ def with_excess_errors(
             f"the tests deviate from the model by {number(100.0 * size, 2)} % beyond noise: "
             "parameters are the closest fit, and their intervals include this deviation"
         )
-        is_slight = size <= _SLIGHT_ERROR and plain_fit.reduced_chi_square < _SLIGHT_MISFIT
+        is_slight = size <= _SLIGHT_ERROR and plain_fit.reduced_chi_square < BEYOND_NOISE
         return found, error, [Caveat("slight_model_error" if is_slight else "model_error", sentence)]
     if not found.names:
         return found, None, []

@@ -25,10 +25,9 @@ _MOST_STRAIN = 1.5
 
 def implausible_strain(test: Loop | Sweep, bushing: Bushing | None) -> Iterator[Caveat]:
     """Warn of a displacement that no rubber of this size endures; `bushing` is None for a specimen."""
-    if test.direction.motion is STRAINING:
-        return  # `implausible_sizes` warns of strains
     half_range = float(np.ptp(test.displacement)) / 2.0 if isinstance(test, Loop) else float(test.amplitude.max())
-    if (strain := 2.0 * half_range * unit_strain(bushing, test.direction)) > _MOST_STRAIN:
+    strain = 2.0 * half_range * unit_strain(bushing, test.direction)
+    if strain > _MOST_STRAIN and test.direction.motion is not STRAINING:  # of strains warns `implausible_sizes`
         size = format_range(test.direction.motion.displacement_unit, half_range)
         sentence = f"an amplitude of {size} is a shear strain of {number(100.0 * strain, 2)} %"
         yield Caveat("implausible_size", f"{sentence}: are its unit and the size of the rubber right?")

@@ -13,7 +13,6 @@ from virtual_rig import LOOP, MOUNT, SWEEPS, rig
 SWEEP = "data/cmp_15961/sweep_axial.csv"
 #: Files that run and diagnose write alike.
 ALIKE = ("diagnosis.json", "gap.csv", "candidates.csv")
-UNKNOWN = "the tests do not determine mu, m, alpha (95 % interval of ±100 % or more)"
 
 
 def test_the_dynamic_fit_takes_the_smallest_amplitude_of_all_sweeps(own):
