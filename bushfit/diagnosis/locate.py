@@ -162,10 +162,10 @@ def _describe_sweep_misfit(
     is_everywhere = len(agreeing) == len(lines)
     levels = f"every {fixed_axis}" if is_everywhere else ", ".join(dict.fromkeys(labels[i] for i in agreeing))
     unit, factor = ("Hz", 1.0) if stepped != "amplitude" else direction.display.displacement
-    low, high = (factor * end for end in spans[stepped == "amplitude"])
+    ends = " to ".join(dict.fromkeys(f"{factor * end:.3g}" for end in spans[stepped == "amplitude"]))
     sentences = [
         f"measured {direction} {quantity} is up to {number(100 * abs(largest), 2)} % of |K| {sides[0]} the model "
-        f"({low:.3g} to {high:.3g} {unit}, at {levels})"
+        f"({ends} {unit}, at {levels})"
     ]
     means = [float(np.mean(piece)) for piece in pieces]
     if across:
