@@ -75,21 +75,24 @@ def print_response(output: Output, response: ResponseOutput) -> None:
     """Print peak and rms force, power, largest strain and rate of each direction, and collect the warnings."""
     from bushfit.units import number
 
-    rows, largest, duration = [], list[str](), number(response.responses[0].history.step * response.time.size, 3)
+    rows, largest, beyond = [], list[str](), list[float | None]()
     for part in response.responses:
-        unit, factor = part.direction.display.force
-        strain, rate = (abs(values).max() for values in (part.strain, part.strain_rate))
-        shares = [f"{number(100.0 * share, 2)} %" for share in part.shares_beyond] if part.tested else ["", ""]
-        forces = [f"{number(factor * size, 4)} {unit}" for size in (part.peak, part.rms)]
-        strains = number(100.0 * strain, 3), shares[0], number(rate, 3), shares[1]
-        power = f"{number(part.power, 3)} {'W/m^3' if part.direction.motion.force_unit == 'Pa' else 'W'}"
-        rows.append((str(part.direction), *forces, power, *strains))
+        (unit, factor), figures = part.direction.display.force, part.summary
+        shares = [figures[f"share_of_time_above_tested_{quantity}"] for quantity in ("strain", "strain_rate")]
+        exceeded = ["" if share is None else f"{number(100.0 * share, 2)} %" for share in shares]
+        forces = [f"{number(factor * figures[key], 4)} {unit}" for key in ("peak_force", "rms_force")]
+        strain, rate = number(100.0 * figures["largest_strain"], 3), number(figures["largest_strain_rate_per_s"], 3)
+        power_unit = "W/m^3" if part.direction.motion.force_unit == "Pa" else "W"
+        power = f"{number(figures['energy_per_second'], 3)} {power_unit}"
+        rows.append((str(part.direction), *forces, power, strain, exceeded[0], rate, exceeded[1]))
         largest.append(f"{forces[0]} {part.label}")
+        beyond += shares
+    duration = number(response.responses[0].history.step * response.time.size, 3)
     verdict = f"force up to {join_names(largest)} over {duration} s"
-    if all(part.tested for part in response.responses):
-        share = max(max(part.shares_beyond) for part in response.responses)
-        beyond = f"{number(100.0 * share, 2)} % of the time beyond the" if share else "within the"
-        verdict += f", {beyond} tested strains and strain rates"
+    if None not in beyond:
+        share = max(filter(None, beyond), default=0.0)
+        tested = f"{number(100.0 * share, 2)} % of the time beyond the" if share else "within the"
+        verdict += f", {tested} tested strains and strain rates"
     action = permitted_use(response.warnings, "The force may be used with its 95 % band.", [row[0] for row in rows])
     output.print_headline(response.result.name, verdict, action)
     heads = ("peak", "rms", "mean power", "strain [%]", "beyond tests", "rate [1/s]", "beyond tests")

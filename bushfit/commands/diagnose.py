@@ -122,7 +122,7 @@ def diagnose(
     validations = validate(diagnosis.result, records)
     if records and diagnosis.added:
         pairs = zip(validations, validate((joint or fit(data)).result, records), strict=True)
-        validations = [replace(validation, nrmse_before=plain.nrmse) for validation, plain in pairs]
+        validations = [replace(validation, nrmse_before=plain.entry["nrmse"]) for validation, plain in pairs]
     if validations:
         document["validation"] = [validation.entry for validation in validations]
     title, gap = data.campaign.name, ResultFile("gap", "table", partial(diagnosed.gap_table, diagnosis))

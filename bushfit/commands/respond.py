@@ -26,7 +26,7 @@ from bushfit.reading.layout import FileFormat
 from bushfit.reading.tablefile import folder_name
 from bushfit.reduction.displacement import prepare_displacements
 from bushfit.report import plots
-from bushfit.report.response import record_table, response_table, summarize_response, validation_table
+from bushfit.report.response import record_table, response_table, validation_table
 from bushfit.report.results import ResultFile
 
 if TYPE_CHECKING:
@@ -129,7 +129,7 @@ def respond(
     notes = dict.fromkeys(note for channel in prepared for note in channel.notes)
     warnings = warnings_of(result, [response.warnings for response in responses], [*notes])
     document: ResponseDocument = {
-        "directions": {str(response.direction): summarize_response(response) for response in responses},
+        "directions": {str(response.direction): response.summary for response in responses},
         **to_entries(warnings),
     }
     title, time = f"{result.name}: force over time", prepared[0].time

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
 
@@ -73,36 +73,25 @@ def car_models(model: Model, unresolved: Sequence[str]) -> list[Model]:
     return [bare.without(*names) for size in count for names in combinations(unresolved, size)]
 
 
-def alternative_models(result: Result, *, rig: bool) -> Iterator[tuple[Result, Model]]:
-    """Yield the alternatives that a diagnosis could not distinguish from the fitted model.
-
-    Args:
-        result: fitted result.
-        rig: True to keep the effects of the rig, as in the tests; False for the bushing alone, as in a car.
-
-    Yields:
-        The result with the parameter errors of the alternative and without a model error; and the alternative model.
-    """
-    resolved = {*result.model.effects} - {*result.unresolved}
-    for other in result.alternatives:
-        explained = replace(result, model=other.model, model_error=None, covariance=other.covariance)
-        twins = [effect.name for effect in other.model.records if effect.twins and effect.name not in resolved]
-        yield from ((explained, model) for model in ([other.model] if rig else car_models(other.model, twins)))
-
-
 def agreeing_models(result: Result, *, rig: bool = False) -> list[tuple[Result, Model]]:
     """List the models that agree with the tests, the fitted model first; a band spans the predictions of all of them.
 
     Args:
         result: fitted result.
-        rig: True to include the effects of the rig, as in the tests.
+        rig: True to include the effects of the rig, as in the tests; False for the bushing alone, as in a car.
 
     Returns:
-        Pairs of the result that contains the errors and the model: the fitted model with every subset of the effects
-        that belong either to bushing or rig, then the alternatives of the diagnosis.
+        Pairs of the result that contains the errors and the model: `result` with the fitted model and every subset of
+        the effects that belong either to bushing or rig; then the alternatives that a diagnosis could not distinguish,
+        with a result that has their parameter errors and no model error.
     """
-    models = [result.model] if rig else car_models(result.model, result.unresolved)
-    return [*((result, model) for model in models), *alternative_models(result, rig=rig)]
+    models = [(result, model) for model in ([result.model] if rig else car_models(result.model, result.unresolved))]
+    resolved = {*result.model.effects} - {*result.unresolved}
+    for other in result.alternatives:
+        explained = replace(result, model=other.model, model_error=None, covariance=other.covariance)
+        twins = [effect.name for effect in other.model.records if effect.twins and effect.name not in resolved]
+        models += [(explained, model) for model in ([other.model] if rig else car_models(other.model, twins))]
+    return models
 
 
 def envelope(bands: Sequence[Band]) -> Band:

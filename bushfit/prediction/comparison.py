@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -208,17 +209,15 @@ def with_model_patterns(result: Result, predictions: Sequence[Prediction]) -> li
         shape = patterns(in_lengths(coordinates(prediction.frequency, strain), process.lengths))[1]
         shapes.append(shape / np.linalg.norm(shape, axis=0))
     ends = np.cumsum([prediction.frequency.size for prediction in predictions])[:-1]
-
-    def spread(band: Band, shape: Array) -> Band:
-        """Replace the two errors of the model, equal at all n points, by the errors of q patterns, `shape` (q, n)."""
-        errors = (shape[:, None] * band.root[-2:]).reshape(-1, shape.shape[1])
-        return replace(band, root=np.concatenate((band.root[:-2], errors)))
-
-    pairs = zip(predictions, np.split(block_diag(*shapes), ends, axis=1), strict=True)
-    return [
-        replace(one, stiffness=spread(one.stiffness, shape), loss_factor=spread(one.loss_factor, shape))
-        for one, shape in pairs
-    ]
+    varied = []
+    for prediction, shape in zip(predictions, np.split(block_diag(*shapes), ends, axis=1), strict=True):
+        bands = dict[str, Any]()
+        for name in ("stiffness", "loss_factor"):
+            band = getattr(prediction, name)
+            errors = (shape[:, None] * band.root[-2:]).reshape(-1, shape.shape[1])
+            bands[name] = replace(band, root=np.concatenate((band.root[:-2], errors)))
+        varied.append(replace(prediction, **bands))
+    return varied
 
 
 def _distance_from_zero(band: Band) -> Array:
@@ -254,12 +253,15 @@ def _describe_difference(band: Band, unit: str, contrast: Contrast) -> str:
         contrast: the compared stiffness, with its operating points.
     """
 
-    def describe(i: int, word: str) -> str:
-        """Text on the difference at point `i`, such as "1.2 % (0.8 to 1.6) higher"; `word` is "higher" or "lower"."""
+    def describe(i: int, word: str) -> tuple[str, str]:
+        """Return texts on point `i`, as "1.2 % (0.8 to 1.6) higher" and "5 Hz, 0.1 mm"; `word` is higher or lower."""
         value, ends = abs(band.value[i]), sorted((abs(band.low[i]), abs(band.high[i])))
         digits = int(np.clip(np.floor(np.log10(value)) - np.floor(np.log10(ends[1] - ends[0])) + 1, 2, _MOST_DIGITS))
         texts = format_aligned([value, *ends], digits)
-        return f"{texts[0]}{unit} ({texts[1]} to {texts[2]}) {word}"
+        amplitude_unit, factor = contrast.place.display.displacement
+        frequency, amplitude = contrast.reference.frequency[i], factor * contrast.reference.amplitude[i]
+        point = f"{format_range('Hz', frequency)}, {format_range(amplitude_unit, amplitude)}"
+        return f"{texts[0]}{unit} ({texts[1]} to {texts[2]}) {word}", point
 
     if not len(band.root):
         ends = (number(round(end, _MOST_DECIMALS), 3, "+") for end in (band.value.min(), band.value.max()))
@@ -270,12 +272,12 @@ def _describe_difference(band: Band, unit: str, contrast: Contrast) -> str:
             size = np.where(sure, np.abs(band.value), np.nan)
             top, bottom = int(np.nanargmax(size)), int(np.nanargmin(size))
             alike_all = sure.all() and min(abs(band.low[top]), abs(band.high[top])) <= size[bottom]
-            parts.append(f"{describe(top, word)} {'throughout' if alike_all else f'at {_format_point(contrast, top)}'}")
+            difference, point = describe(top, word)
+            parts.append(f"{difference} {'throughout' if alike_all else f'at {point}'}")
             if 1 < (count := int(sure.sum())) < sure.size:
                 parts[-1] += f" ({word} at {count} of {sure.size} points)"
             if sure.all() and not alike_all:
-                smallest = f"{describe(bottom, word)} at {_format_point(contrast, bottom)}"
-                parts[-1] = f"{smallest}, up to {parts[-1]}"
+                parts[-1] = f"{' at '.join(describe(bottom, word))}, up to {parts[-1]}"
     none = (band.low <= 0.0) & (band.high >= 0.0)
     if none.any():
         largest = number(float(np.maximum(-band.low, band.high)[none].max()), 2)
@@ -283,10 +285,3 @@ def _describe_difference(band: Band, unit: str, contrast: Contrast) -> str:
             f"{'elsewhere ' if parts else ''}no difference detected (up to {largest}{unit} cannot be excluded)"
         )
     return ", ".join(parts)
-
-
-def _format_point(contrast: Contrast, i: int) -> str:
-    """Format the frequency and amplitude of the operating point with index `i`."""
-    unit, factor = contrast.place.display.displacement
-    frequency, amplitude = contrast.reference.frequency[i], factor * contrast.reference.amplitude[i]
-    return f"{format_range('Hz', frequency)}, {format_range(unit, amplitude)}"

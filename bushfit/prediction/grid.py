@@ -183,7 +183,7 @@ def _limit(values: Array, ranges: Sequence[Any], count: int) -> Array:
     if low > high * (1 + MARGIN):
         return values
     inside = values[(values >= low * (1 - MARGIN)) & (values <= high * (1 + MARGIN))]  # rigs miss their set points
-    return inside if inside.size > 1 else _geometric_values(low, high, count)
+    return inside if inside.size > 1 else _distinct(np.geomspace(low, high, count), digits=3)
 
 
 def measured_levels(sweeps: Sequence[Sweep], axis: Literal["frequency", "amplitude"]) -> Array:
@@ -211,19 +211,19 @@ def measured_levels(sweeps: Sequence[Sweep], axis: Literal["frequency", "amplitu
         (free_values if is_free else set_values).append(values)
     spanned = _distinct(np.concatenate(free_values))
     if spanned.size > _MOST_STEPS:
-        spanned = _geometric_values(spanned[0], spanned[-1], _MOST_STEPS)
+        spanned = _distinct(np.geomspace(spanned[0], spanned[-1], _MOST_STEPS), digits=3)
     return _distinct(np.concatenate([_distinct(np.concatenate(set_values)), spanned]))
 
 
-def _geometric_values(low: float, high: float, count: int) -> Array:
-    """Values from `low` to `high` in equal ratios, to three digits, (count,); fewer if values within 1 % are merged."""
-    return _distinct(np.array([float(f"{x:.3g}") for x in np.geomspace(low, high, count)]))
+def _distinct(values: Array, digits: int = 17) -> Array:
+    """Sort values, (n,), and merge those within 1 % of each other: the rig reaches a set point only approximately.
 
-
-def _distinct(values: Array) -> Array:
-    """Sort values, (n,), and merge those within 1 % of each other: the rig reaches a set point only approximately."""
+    Args:
+        values: frequencies or amplitudes, (n,), in any order.
+        digits: significant digits to which the values are rounded; by default they are unchanged.
+    """
     distinct: list[float] = []
-    for value in np.unique(values):
+    for value in np.unique([float(f"{value:.{digits}g}") for value in values]).tolist():
         if not distinct or value > distinct[-1] * (1.0 + MARGIN):
-            distinct.append(float(value))
+            distinct.append(value)
     return np.array(distinct)

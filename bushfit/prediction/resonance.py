@@ -14,7 +14,7 @@ from bushfit.errors import ModelError
 from bushfit.geometry import TRANSLATION, Place
 from bushfit.model.model import Model
 from bushfit.model.result import Result
-from bushfit.prediction.bands import alternative_models, car_models
+from bushfit.prediction.bands import agreeing_models
 from bushfit.prediction.caveats import extrapolations, unfitted_warnings
 from bushfit.prediction.conditions import OperatingPoints, PredictedPlace, rubber_conditions
 from bushfit.reading.preload import Preload
@@ -98,7 +98,8 @@ def predict_resonance(
     """
     if place.motion is not TRANSLATION:
         raise ModelError("a mass needs a translation", found=str(place), expected="axial, radial or a mount")
-    bushings, *rig_models = car_models(result.model, result.unresolved)
+    models = agreeing_models(result)
+    bushings, *rig_models = (model for source, model in models if source is result)
     conditions = rubber_conditions(result, place, temperature, preload)
     if frequencies is None:
         small = bushings.stiffness(place, 1.0, _SMALL_STRAIN / bushings.unit_strain(place), conditions=conditions)
@@ -120,7 +121,7 @@ def predict_resonance(
     points = OperatingPoints(place, frequency[near], predicted.amplitude[near], conditions)
     warnings = [*unfitted_warnings(result, place), *extrapolations(result, points, subject)]
     if result.alternatives:
-        peaks = np.array([shaken(model).peak for _, model in alternative_models(result, rig=False)])
+        peaks = np.array([shaken(model).peak for source, model in models if source is not result])
         (low, smallest), (high, largest) = peaks.min(axis=0), peaks.max(axis=0)
         span = f"{number(low, 4)} to {number(high, 4)} Hz, |T| {number(smallest, 4)} to {number(largest, 4)}"
         spread = Caveat("resonance_range", f"{span}, for all models that agree with the tests")

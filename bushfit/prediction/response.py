@@ -1,6 +1,8 @@
 """Force over time for a displacement history, from the laws in time, with its 95 % band."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from scipy.fft import next_fast_len
@@ -61,34 +63,30 @@ class TimeResponse(PredictedPlace):
         """Largest magnitude of the force [N, N m or Pa]."""
         return float(np.abs(self.force.value).max())
 
-    @property
-    def rms(self) -> float:
-        """Root mean square of the force [N, N m or Pa]."""
-        return float(np.sqrt(np.mean(np.square(self.force.value))))
+    @cached_property
+    def summary(self) -> dict[str, Any]:
+        """Figures of the motion and the force, as in `respond --json`.
 
-    @property
-    def power(self) -> float:
-        """Mean power that the motion transfers to the bushing [W], or to a unit volume of a specimen [W/m^3]."""
-        return work(self.history, self.force.value) / (self.history.step * self.history.value.size)
-
-    @property
-    def strain(self) -> Array:
-        """Equivalent strain, (n,)."""
-        return self.unit_strain * self.history.value
-
-    @property
-    def strain_rate(self) -> Array:
-        """Rate of the equivalent strain [1/s], (n,)."""
-        return self.unit_strain * self.history.rate
-
-    @property
-    def shares_beyond(self) -> tuple[float, float]:
-        """Fractions of the samples whose strain, and whose strain rate, exceeds that of all fitted tests, 0 to 1."""
-        strain, rate = self.tested or (np.inf, np.inf)
-        return (
-            float(np.mean(np.abs(self.strain) > strain * (1.0 + MARGIN))),
-            float(np.mean(np.abs(self.strain_rate) > rate * (1.0 + MARGIN))),
-        )
+        Returns:
+            Peak and rms force, mean power that the motion transfers to the bushing [W] or to a unit volume of a
+            specimen [W/m^3], largest strain and strain rate [SI]; and the fractions of the samples, 0 to 1, whose
+            strain, and whose strain rate, exceeds that of all fitted tests; None if the model was not fitted.
+        """
+        history, force = self.history, self.force.value
+        strain, rate = (self.unit_strain * np.abs(values) for values in (history.value, history.rate))
+        shares: list[float | None] = [None, None]
+        if self.tested:
+            limits = zip((strain, rate), self.tested, strict=True)
+            shares = [float(np.mean(values > limit * (1.0 + MARGIN))) for values, limit in limits]
+        return {
+            "peak_force": self.peak,
+            "rms_force": float(np.sqrt(np.mean(np.square(force)))),
+            "energy_per_second": work(history, force) / (history.step * history.value.size),
+            "largest_strain": float(strain.max()),
+            "largest_strain_rate_per_s": float(rate.max()),
+            "share_of_time_above_tested_strain": shares[0],
+            "share_of_time_above_tested_strain_rate": shares[1],
+        }
 
 
 def work(history: History, force: Array) -> float:
@@ -132,8 +130,18 @@ def time_response(
     )
     models, untimed = models_with_time_law(timed, str(place), rig=rig)
     force = envelope([_force(source, model, place, history, conditions) for source, model in models])
-    unit_strain, tested = result.model.unit_strain(place), _tested_strains(result)
-    response = TimeResponse(place, history, force, unit_strain, tested, conditions=conditions)
+    tested = None
+    if result.measured:
+        fitted = (place for place in result.fitted_places if result.model.bushing or isinstance(place, Specimen))
+        places = {str(place): place for place in fitted}
+        ends = [
+            (test.amplitude[-1] * result.model.unit_strain(places[test.place]), test.frequency_Hz[-1])
+            for test in (result.campaign.tests if result.campaign else ())
+            if test.place in places
+        ]
+        largest, highest = result.measured.strain[1], result.measured.frequency[1]
+        tested = largest, max(2.0 * np.pi * strain * hertz for strain, hertz in ends or [(largest, highest)])
+    response = TimeResponse(place, history, force, result.model.unit_strain(place), tested, conditions=conditions)
     return replace(response, warnings=(*_warnings(result, response, sorted(left_out)), *untimed))
 
 
@@ -147,9 +155,14 @@ def _force(result: Result, model: Model, place: Place, history: History, conditi
         history: displacement [m, rad or 1], (n,).
         conditions: temperature and preload of the rubber.
 
-    Notes: the model's relative errors of real and imaginary part multiply the force and its Hilbert transform. The
-    largest of three errors is used: at the mean frequency and the peak amplitude; at the mean frequency and the
-    amplitude of a sine of equal rms; and far from the tested points, because the tests are sines but not this motion.
+    Notes:
+        An unnamed correction of the model multiplies each frequency of the force by the ratio of the stiffness with and
+        without the correction in a sine of equal rms displacement, which is exact for a sine (statistical
+        linearisation, T. K. Caughey, J. Acoust. Soc. Am. 35 (1963) 1706); the mean force is not corrected.
+
+        The model's relative errors of real and imaginary part multiply the force and its Hilbert transform. The largest
+        of three errors is used: at the mean frequency and the peak amplitude; at the mean frequency and the amplitude
+        of a sine of equal rms; and far from the tested points, because the tests are sines but not this motion.
     """
     amplitude = np.array([np.abs(history.value).max(), np.sqrt(2.0) * np.std(history.value)])
     amplitude = np.maximum(amplitude, np.finfo(float).eps)
@@ -160,7 +173,13 @@ def _force(result: Result, model: Model, place: Place, history: History, conditi
         named.force(place, history, kind="loop", conditions=conditions)
     force, slopes = force_and_slopes(named, place, history, errors.covariance.names, conditions)
     if model.unnamed:
-        force = _corrected_force(force, model, place, history, conditions)
+        samples = force.size if history.periodic else next_fast_len(2 * force.size)
+        frequency = np.fft.rfftfreq(samples, history.step)[1:]
+        grid = np.geomspace(frequency[0], frequency[-1], _CORRECTED)
+        factor = correction_factor(model, OperatingPoints(place, grid, amplitude[1], conditions))
+        spectrum = np.fft.rfft(force, samples)
+        spectrum[1:] *= np.interp(np.log(frequency), np.log(grid), factor)
+        force = np.fft.irfft(spectrum, samples)[: force.size]
     half = errors.scale.max() * errors.covariance.half_width(slopes)
     if errors.relative.size:
         from scipy.signal import hilbert  # slow to import
@@ -172,46 +191,6 @@ def _force(result: Result, model: Model, place: Place, history: History, conditi
         quadrature = hilbert(force, next_fast_len(force.size)).imag[: force.size]
         half = np.sqrt(half**2 + Z95**2 * ((real * force) ** 2 + (imaginary * quadrature) ** 2))
     return Band(force, force - half, force + half)
-
-
-def _corrected_force(force: Array, model: Model, place: Place, history: History, conditions: RubberConditions) -> Array:
-    """Apply the unnamed correction of a model to a force without it.
-
-    Args:
-        force: force of the other effects [N, N m or Pa], (n,).
-        model: model with the correction.
-        place: direction or specimen.
-        history: displacement [m, rad or 1], (n,).
-        conditions: temperature and preload of the rubber.
-
-    Returns:
-        Corrected force [N, N m or Pa], (n,). Each frequency is multiplied by the ratio of the stiffness with and
-        without the correction in a sine of equal rms displacement, which is exact for a sine (statistical
-        linearisation, T. K. Caughey, J. Acoust. Soc. Am. 35 (1963) 1706); the mean force is not corrected.
-    """
-    samples = force.size if history.periodic else next_fast_len(2 * force.size)
-    frequency = np.fft.rfftfreq(samples, history.step)[1:]
-    grid = np.geomspace(frequency[0], frequency[-1], _CORRECTED)
-    amplitude = np.maximum(np.sqrt(2.0) * np.std(history.value), np.finfo(float).eps)
-    factor = correction_factor(model, OperatingPoints(place, grid, amplitude, conditions))
-    spectrum = np.fft.rfft(force, samples)
-    spectrum[1:] *= np.interp(np.log(frequency), np.log(grid), factor)
-    return np.fft.irfft(spectrum, samples)[: force.size]
-
-
-def _tested_strains(result: Result) -> tuple[float, float] | None:
-    """Two numbers: largest strain [1] and strain rate [1/s] of the fitted tests; None if nothing was fitted."""
-    if result.measured is None:
-        return None
-    fitted = (place for place in result.fitted_places if result.model.bushing or isinstance(place, Specimen))
-    places = {str(place): place for place in fitted}
-    tests = [
-        (test.amplitude[-1] * result.model.unit_strain(places[test.place]), test.frequency_Hz[-1])
-        for test in (result.campaign.tests if result.campaign else ())
-        if test.place in places
-    ]
-    ends = tests or [(result.measured.strain[1], result.measured.frequency[1])]
-    return result.measured.strain[1], max(2.0 * np.pi * strain * frequency for strain, frequency in ends)
 
 
 def _warnings(result: Result, response: TimeResponse, left_out: list[str]) -> list[Caveat]:
@@ -228,11 +207,10 @@ def _warnings(result: Result, response: TimeResponse, left_out: list[str]) -> li
         largest = max(np.abs(history.value).max(), result.measured.strain[0] / response.unit_strain)
         point = np.array([history.frequency]), np.array([largest])
         warnings += extrapolations(result, OperatingPoints(place, *point, response.conditions))
-    if response.tested and (share := response.shares_beyond[1]):
-        rate = (
-            f"{number(np.abs(response.strain_rate).max(), 3)} 1/s, but fitted at up to {number(response.tested[1], 3)}"
-        )
-        sentence = f"strain rates up to {rate} 1/s only, in {number(100.0 * share, 2)} % of time: {BEYOND}"
+    if response.tested and (share := response.summary["share_of_time_above_tested_strain_rate"]):
+        ends = [number(rate, 3) for rate in (response.summary["largest_strain_rate_per_s"], response.tested[1])]
+        rates = f"strain rates up to {ends[0]} 1/s, but fitted at up to {ends[1]} 1/s only"
+        sentence = f"{rates}, in {number(100.0 * share, 2)} % of time: {BEYOND}"
         of_motion.append(Caveat("extrapolated_rate", sentence))
     if (result.model.unnamed or result.model_error) and "friction" in result.model.effects:
         sentence = (

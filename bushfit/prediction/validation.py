@@ -53,39 +53,22 @@ class Validation:
 
     @property
     def entry(self) -> ValidationEntry:
-        """Name of the record and numbers of the comparison (NRMSE, gaps of peak and work), as in diagnosis.json."""
+        """Comparison of the measured and the predicted force in numbers.
+
+        Returns:
+            Entry of diagnosis.json: NRMSE, gaps of peak force and work, and share of the points inside the band.
+        """
+        force, history, measured = self.response.force, self.response.history, self.measured
+        error = force.value - measured
         return {
             "test": self.record.name,
             "direction": str(self.record.direction),
-            "nrmse": self.nrmse,
+            "nrmse": float(2.0 * np.sqrt(np.mean(np.square(error))) / np.ptp(measured)),
             "nrmse_before": self.nrmse_before,
-            "peak_gap": self.peak_gap,
-            "energy_gap": self.energy_gap,
-            "share_inside": self.share_inside,
+            "peak_gap": float(1.0 - self.response.peak / np.abs(measured).max()),
+            "energy_gap": 1.0 - work(history, force.value) / work(history, measured),
+            "share_inside": float(np.mean((force.low <= measured) & (measured <= force.high))),
         }
-
-    @property
-    def nrmse(self) -> float:
-        """Root mean square of measured minus predicted force, relative to half the range of the measured force."""
-        error = self.response.force.value - self.measured
-        return float(2.0 * np.sqrt(np.mean(np.square(error))) / np.ptp(self.measured))
-
-    @property
-    def peak_gap(self) -> float:
-        """Relative difference of the largest magnitude of the force: measured minus predicted, over measured."""
-        return float(1.0 - self.response.peak / np.abs(self.measured).max())
-
-    @property
-    def energy_gap(self) -> float:
-        """Relative difference of the work of the motion on the bushing: measured minus predicted, over measured."""
-        history = self.response.history
-        return 1.0 - work(history, self.response.force.value) / work(history, self.measured)
-
-    @property
-    def share_inside(self) -> float:
-        """Share of the measured points inside the 95 % band of the predicted force, 0 to 1."""
-        force = self.response.force
-        return float(np.mean((force.low <= self.measured) & (self.measured <= force.high)))
 
 
 def validate(result: Result, records: Sequence[Loop]) -> list[Validation]:

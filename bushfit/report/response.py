@@ -1,4 +1,4 @@
-"""Tables of a force over time, measured and predicted, and its peak, energy and strain."""
+"""Tables of a force over time, measured and predicted."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -56,21 +56,3 @@ def record_table(validation: Validation) -> pd.DataFrame:
     table, place = response_table(validation.record.time, [validation.response]), validation.record.direction
     unit, factor = place.display.force
     return table.assign(**{f"measured {place.motion.words[1]} [{unit}]": factor * validation.measured})
-
-
-def summarize_response(response: TimeResponse) -> dict[str, float | None]:
-    """Summarise the response to a displacement history in numbers [SI].
-
-    Returns:
-        Peak and rms force, energy, strain and strain rate by the keys of `respond --json`; None if not known.
-    """
-    strain_share, rate_share = response.shares_beyond if response.tested else (None, None)
-    return {
-        "peak_force": response.peak,
-        "rms_force": response.rms,
-        "energy_per_second": response.power,
-        "largest_strain": float(abs(response.strain).max()),
-        "largest_strain_rate_per_s": float(abs(response.strain_rate).max()),
-        "share_of_time_above_tested_strain": strain_share,
-        "share_of_time_above_tested_strain_rate": rate_share,
-    }
