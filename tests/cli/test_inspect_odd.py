@@ -3,6 +3,7 @@
 import json
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -31,7 +32,7 @@ def sine(time: Array, percent: float, frequency: float) -> Array:
     return percent / 100.0 * np.sin(2.0 * np.pi * frequency * time + 0.3)
 
 
-def inspected(typed: Run, file: str) -> dict[str, object]:
+def inspected(typed: Run, file: str) -> dict[str, Any]:
     (seen,) = json.loads(typed("inspect", file, "--json", "--no-plots").stdout)["files"]
     return seen
 
@@ -152,8 +153,7 @@ def test_a_small_test_with_time_for_itself_is_read(typed, tmp_path, levels, mean
 def odd(typed: Run, folder: Path, header: str, stiffness: np.ndarray, frequency: np.ndarray = FREQUENCY) -> list[str]:
     columns = (frequency, np.full(frequency.size, 0.1), stiffness, np.full(frequency.size, 0.1))
     np.savetxt(folder / "axial.csv", np.column_stack(columns), "%.6g", ",", header=header, comments="")
-    (seen,) = json.loads(typed("inspect", "axial.csv", "--json", "--no-plots").stdout)["files"]
-    return seen["odd"]
+    return inspected(typed, "axial.csv")["odd"]
 
 
 @pytest.mark.parametrize("row", [0, 1, 5, 9])

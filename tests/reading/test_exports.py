@@ -111,6 +111,15 @@ def test_rows_without_a_remark_are_selected_as_inspect_prints(tmp_path):
     check(load_campaign(campaign).sweeps[0], expected("sweep"))
 
 
+def loop_book(header: str = "force [N]", factor: float = 1.0) -> openpyxl.Workbook:
+    """The loop in a workbook, its force under a header and times a factor."""
+    book = openpyxl.Workbook()
+    columns = (TIME.tolist(), DISPLACEMENT, factor * FORCE)
+    for row in ["time [s]", "displacement [mm]", header], *zip(*columns, strict=True):
+        book.active.append(row)
+    return book
+
+
 @pytest.mark.parametrize("sheets", [True, False])
 def test_forces_in_names_that_differ_are_preloads(sheets, tmp_path):
     """One file or sheet alone may state anything by a force in its name."""
@@ -200,12 +209,7 @@ def test_parts_side_by_side_and_date_cells_of_a_workbook(tmp_path):
     ],
 )
 def test_numbers_of_a_workbook_are_read_as_it_shows_them(header, form, factor, words, tmp_path):
-    book = openpyxl.Workbook()
-    for row in (
-        ["time [s]", "displacement [mm]", header],
-        *zip(TIME.tolist(), DISPLACEMENT, factor * FORCE, strict=True),
-    ):
-        book.active.append(row)
+    book = loop_book(header, factor)
     for row in (2, 3) if words else range(2, TIME.size + 2):
         book.active.cell(row, 3).number_format = form
     if words:
@@ -218,9 +222,7 @@ def test_numbers_of_a_workbook_are_read_as_it_shows_them(header, form, factor, w
 
 
 def test_the_direction_on_another_sheet_of_a_workbook(tmp_path):
-    book = openpyxl.Workbook()
-    for row in ["time [s]", "displacement [mm]", "force [N]"], *zip(TIME.tolist(), DISPLACEMENT, FORCE, strict=True):
-        book.active.append(row)
+    book = loop_book()
     for row in (["Direction", "radial"], ["Temperature", "30 degC"]):
         (book["Info"] if "Info" in book else book.create_sheet("Info")).append(row)
     book.save(tmp_path / "loop.xlsx")
@@ -229,9 +231,7 @@ def test_the_direction_on_another_sheet_of_a_workbook(tmp_path):
 
 
 def test_hidden_rows_of_a_workbook_are_read_and_reported(tmp_path):
-    book = openpyxl.Workbook()
-    for row in ["time [s]", "displacement [mm]", "force [N]"], *zip(TIME.tolist(), DISPLACEMENT, FORCE, strict=True):
-        book.active.append(row)
+    book = loop_book()
     for row in (2, 3):
         book.active.row_dimensions[row].hidden = True
     book.save(tmp_path / "loop.xlsx")
@@ -251,28 +251,22 @@ def test_a_second_channel_of_a_long_record_is_asked_about(tmp_path):
     assert "more than one column could be the displacement" in done.stderr
 
 
+def label(unit: str) -> dict[str, object]:
+    return {"quantity": {"label": unit}}
+
+
 @pytest.mark.parametrize(
     "variables",
     [
-        {
-            "A": {
-                "data": np.column_stack([TIME, DISPLACEMENT, FORCE]),
-                "colheaders": ["t [s]", "Disp [mm]", "Force [N]"],
-            }
-        },
+        {"A": {"data": np.stack([TIME, DISPLACEMENT, FORCE], 1), "colheaders": ["t [s]", "Disp [mm]", "Force [N]"]}},
         {"fs": 20.0, "disp_mm": DISPLACEMENT, "force_N": FORCE},
         {
-            f"Signal_{number}": {
-                "x_values": {
-                    "start_value": 0.0,
-                    "increment": 0.05,
-                    "number_of_values": 600.0,
-                    "quantity": {"label": "s"},
-                },
-                "y_values": {"values": values, "quantity": {"label": unit}},
+            f"Signal_{name}": {
+                "x_values": {"start_value": 0.0, "increment": 0.05, "number_of_values": 600.0, **label("s")},
+                "y_values": {"values": values, **label(unit)},
                 "function_record": {"name": name},
             }
-            for number, (name, values, unit) in enumerate([("Point 1", DISPLACEMENT, "mm"), ("Point 2", FORCE, "N")])
+            for name, values, unit in (("Point_1", DISPLACEMENT, "mm"), ("Point_2", FORCE, "N"))
         },
     ],
     ids=["importdata", "scalar rate", "Testlab"],
