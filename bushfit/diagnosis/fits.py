@@ -173,10 +173,10 @@ def result_of(
         The model with covariance, quality, range, warnings and expected error.
     """
 
-    def with_levels(errors: LevelErrors) -> FitResult:
+    def with_levels(model: Model, errors: LevelErrors) -> FitResult:
         """Repeat the fit with a further error that all runs at one amplitude or frequency (a level) have in common."""
         tests = with_level_errors(fit.problem.tests, errors.error, errors.freedom)
-        return Descent.start(replace(fit.problem, model=fit.model, tests=tests)).run(EVALUATIONS).solution
+        return Descent.start(replace(fit.problem, model=model, tests=tests)).run(EVALUATIONS).solution
 
     closest, error, misses = fit, None, list[Caveat]()
     if corrected:

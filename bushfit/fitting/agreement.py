@@ -4,14 +4,16 @@ Each test and each run has its own figures, so that the thousands of rows of a l
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from bushfit.caveat import Caveat
 from bushfit.effects.contract import Array
-from bushfit.fitting.coordinates import Coordinates, coordinate_changes, prior_covariance
+from bushfit.fitting.assess import covariance
+from bushfit.fitting.coordinates import Coordinates, prior_covariance
+from bushfit.fitting.descent import repeat_fit
 from bushfit.fitting.preparation import MeasuredSweep, MeasuredTest, log_slopes, residual_slices
 from bushfit.fitting.problem import FitResult
 from bushfit.model.covariance import Z95, Covariance
@@ -33,8 +35,6 @@ _SHARE = 0.95
 _ENOUGH = 0.5
 #: Fewest points whose expected error is stated if all are fitted: the five parameters can pass through fewer points.
 _FEWEST_FITTED = 5
-#: Share of the information that comes from a prior, above which tests cannot contradict it.
-_ALL = 0.99
 #: Constant quantity of a test that is not a run at a constant amplitude or frequency.
 _NO_RUN: dict[str, Any] = {"held": None, "value": None, "unit": None}
 
@@ -197,47 +197,40 @@ def expected_errors(
     return _errors_by_direction(parts)
 
 
-def prior_uses(solution: FitResult, covariance: Covariance) -> dict[str, PriorUse]:
+def prior_uses(steps: Sequence[FitResult], fixed: Covariance | None) -> dict[str, PriorUse]:
     """Share of each prior in a fit's estimate, and its distance from the tests' estimate in standard deviations.
 
+    Let P be the mean of the prior, T the estimate of the tests and the other priors, from fits that are repeated with
+    this prior weakened, and v_P and v_T their variances. The share of the prior is v_T/(v_T + v_P), and the distance is
+    (T - P)/sqrt(v_T + v_P).
+
     Args:
-        solution: result of the fit.
-        covariance: covariance of the fitted parameters.
+        steps: fits of a procedure, in order.
+        fixed: covariance of parameters that all fits kept fixed; None if these are exact.
 
     Returns:
         By name of the parameter, the share of the information (1/variance) that comes from the prior, and the distance
-        between the tests and the prior in standard deviations.
-
-    Notes:
-        Let S be the variance of the prior, V that of the estimate, and v that of the estimate if the weights of the fit
-        are right. Then w = v/S is the weight of the prior. The tests alone have the variance T with V = w^2 S + (1 -
-        w)^2 T, and the share of the prior is T/(S + T), which is w for right weights. If prior and tests agree, the
-        estimate differs from the mean of the prior with the variance V + S - 2 v, which is S - v for right weights.
+        between the tests and the prior in standard deviations. Parameters that end at a bound without their prior are
+        omitted.
     """
-    moving, model = solution.inner_indices, solution.model
-    names, uses = [solution.names[i] for i in moving], dict[str, PriorUse]()
-    rows = solution.jacobian[moving]
-    linear = np.linalg.pinv(rows @ rows.T, hermitian=True)
+    model, uses = steps[-1].model, dict[str, PriorUse]()
     for prior in model.constraints.priors:
-        uncertain = [name for name in prior.names if name in covariance.names]
-        if not names or not uncertain:
-            continue
-        coordinates = Coordinates.of_parameters(model, uncertain)
+        weak = replace(model, constraints=model.constraints.weaken(prior))
+        alone = [repeat_fit(step, replace(step.model, constraints=weak.constraints)) for step in steps]
+        last, stages = alone[-1], [step.stage(step.at_bound) for step in alone]
+        known = covariance(last.model, stages, fixed, last.smooth_error)
+        estimated = {name: step.model.values[name] for step in alone for name in step.names}
+        values = weak.with_values(estimated).values
+        names = [name for name in prior.names if name in known.names and name in {*estimated, *model.tied}]
+        coordinates = Coordinates.of_parameters(model, names)
         mean = dict(zip(prior.names, prior.mean.tolist(), strict=True))
         deviation = dict(zip(prior.names, np.sqrt(np.diag(prior.covariance)).tolist(), strict=True))
-        before = np.diag(prior_covariance(prior, coordinates))
-        changes = coordinate_changes(model, names, uncertain)
-        after = np.diag(changes.T @ linear @ changes)
-        distances = coordinates.point(model.values) - coordinates.point(mean)
-        errors = np.array([covariance.stderr(name) for name in uncertain]) / coordinates.slopes(model.values)
-        spread = np.sqrt(np.maximum(np.square(errors) + before - 2.0 * after, np.finfo(float).tiny))
-        for i, name in enumerate(uncertain):
-            if np.any(changes[:, i]):
-                share, distance = min(float(after[i] / before[i]), 1.0), 0.0
-                if share < _ALL:
-                    tests = max(errors[i] ** 2 - share**2 * before[i], 0.0) / (1.0 - share) ** 2
-                    share, distance = float(tests / (before[i] + tests)), float(distances[i] / spread[i])
-                uses[name] = PriorUse(prior.source, mean[name], deviation[name], share, distance)
+        of_prior = np.diag(prior_covariance(prior, coordinates))
+        of_tests = np.square([known.stderr(name) for name in names] / coordinates.slopes(values))
+        distance = (coordinates.point(values) - coordinates.point(mean)) / np.sqrt(of_tests + of_prior)
+        share = of_tests / (of_tests + of_prior)
+        for i, name in enumerate(names):
+            uses[name] = PriorUse(prior.source, mean[name], deviation[name], float(share[i]), float(distance[i]))
     return uses
 
 

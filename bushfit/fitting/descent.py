@@ -22,6 +22,7 @@ from bushfit.effects.contract import Array
 from bushfit.errors import FitError, ModelError
 from bushfit.fitting.coordinates import ROUNDING
 from bushfit.fitting.problem import FitProblem, FitResult
+from bushfit.model.model import Model
 
 #: Damping of the first step, relative to the curvature: next to none, the starts are good (usual for such methods).
 _FIRST_DAMPING = 1e-3
@@ -243,6 +244,21 @@ class Descent:
     def _length(self, step: Array) -> float:
         """Length of a step, (k,): root sum square of the changes of all residuals by each parameter alone."""
         return float(np.sqrt(np.diag(self._hessian_and_gradient[0]) @ np.square(step)))
+
+
+def repeat_fit(fit: FitResult, model: Model) -> FitResult:
+    """Repeat a fit with the priors of another model and with its values as start; tests and weights are unchanged.
+
+    Args:
+        fit: the fit to repeat.
+        model: model with the same effects.
+
+    Returns:
+        The new fit, with the outliers and the smooth error of `fit`.
+    """
+    found = Descent.start(replace(fit.problem, model=model), TOLERANCE).run().solution
+    weighed = replace(found, covariance_tests=fit.covariance_tests, noise_weighted=fit.noise_weighted)
+    return replace(weighed, outliers=fit.outliers, smooth_error=fit.smooth_error)
 
 
 def _solve(curvature: Array, pull: Array, free: Array) -> Array:

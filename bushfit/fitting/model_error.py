@@ -30,7 +30,7 @@ from bushfit.effects.unnamed import Unnamed
 from bushfit.errors import FitError, ModelError
 from bushfit.fitting.assess import excess_chi_square
 from bushfit.fitting.coordinates import ROUNDING, Bounds, Coordinates, prior_covariance
-from bushfit.fitting.descent import TOLERANCE, Descent
+from bushfit.fitting.descent import TOLERANCE, Descent, repeat_fit
 from bushfit.fitting.discrepancy import (
     COMPOUND_LENGTHS,
     OVER_FREQUENCY,
@@ -72,23 +72,36 @@ _MAXIMUM_ROUNDS, _SETTLED = 12, 0.02
 
 
 def with_excess_errors(
-    plain_fit: FitResult, bounds: Bounds, rig: RigSettings, refit: Callable[[LevelErrors], FitResult]
+    plain_fit: FitResult, bounds: Bounds, rig: RigSettings, refit: Callable[[Model, LevelErrors], FitResult]
 ) -> tuple[FitResult, Unnamed | None, list[Caveat]]:
     """Repeat a fit with errors beyond the noise that its tests show: of the model, or shared by the runs of a level.
 
     A level is one constant amplitude or frequency. If levels disagree by more than chance explains, the rig or the
-    model may be the cause, so the fit includes errors of both.
+    model may be the cause, so the fit includes errors of both. A misfit that a wrong prior causes is no error, so the
+    errors are those of a fit with weak priors.
 
     Args:
         plain_fit: least-squares fit with the noise alone.
         bounds: limits of parameters [SI], inside their default limits.
         rig: accuracy class of the rig (stated gain and phase errors).
-        refit: function that repeats the fit with the given errors of levels in the noise.
+        refit: function that repeats the fit from the given model with the given errors of levels in the noise.
 
     Returns:
         The fit; the error of the model as a correction of the stiffness, or None; and a warning if the model misses its
         tests.
     """
+    model, constraints = plain_fit.model, plain_fit.model.constraints
+    if constraints.priors:
+        alone = repeat_fit(plain_fit, replace(model, constraints=constraints.weaken(*constraints.priors)))
+        found, error, notes = _with_excess_errors(alone, bounds, rig, refit)
+        return (plain_fit if found is alone else repeat_fit(found, model)), error, notes
+    return _with_excess_errors(plain_fit, bounds, rig, refit)
+
+
+def _with_excess_errors(
+    plain_fit: FitResult, bounds: Bounds, rig: RigSettings, refit: Callable[[Model, LevelErrors], FitResult]
+) -> tuple[FitResult, Unnamed | None, list[Caveat]]:
+    """Repeat a fit with the errors that its tests show, see `with_excess_errors`; its priors are taken as right."""
     found, error = with_model_error(plain_fit, bounds, rig)
     if error:
         size = max(error.rms, *(test.model_error for test in found.problem.tests))
@@ -102,7 +115,7 @@ def with_excess_errors(
         return found, None, []
     errors = level_errors(found.problem.tests, found.residual, found.jacobian, largest_error(rig))
     if errors.freedom and any(errors.error):
-        found = refit(errors)
+        found = refit(found.model, errors)
     if errors.significant:
         found, error = with_model_error(found, bounds, certain=True)
     text = (

@@ -100,9 +100,9 @@ def fit_joint(
     problem = data.problem(data.starting_model(effects, tests), [replace(test) for test in tests])
     found = solve_problem(problem, robust=data.robust)
 
-    def refit(errors: LevelErrors) -> FitResult:
+    def refit(model: Model, errors: LevelErrors) -> FitResult:
         with_errors = with_level_errors(tests, errors.error, errors.freedom)
-        return solve_problem(replace(problem, model=found.model, tests=with_errors), robust=data.robust)
+        return solve_problem(replace(problem, model=model, tests=with_errors), robust=data.robust)
 
     found, error, notes = with_excess_errors(found, data.bounds, data.campaign.rig, refit)
     result = build_result([found], data.bounds, unused=unused)
@@ -317,7 +317,7 @@ def build_result(
     without_bounded = bounded_is_fixed or last.smooth_error  # beside an error, a parameter at a bound is fixed
     stages = [step.stage(step.at_bound if without_bounded else ()) for step in steps]
     cov = covariance(last.model, stages, fixed, last.smooth_error)
-    priors = {name: use for step in steps for name, use in prior_uses(step, cov).items()}
+    priors = prior_uses(steps, fixed)
     warnings = [*notes, *prior_warnings(priors)]
     for step in steps:
         limited, limits = replace(step, problem=replace(step.problem, bounds=bounds)), dict[str, float | None]()

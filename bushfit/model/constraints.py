@@ -3,7 +3,7 @@
 import ast
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -23,6 +23,8 @@ _GRAMMAR = {"module", "expr", "expression", "binop", "unaryop", "call", "name", 
 _NAME = r"(?<![\w.])[A-Za-z_]\w*(?:\.(?:(?:{bodies})(?!\w)|[\w.]*))?(?!\w*\s*\()"
 #: Relative step into the complex plane: a derivative so taken is exact to rounding.
 _STEP = 1e-30
+#: Factor on the standard deviation of a prior that is weak beside any test.
+_WEAK = 100.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,6 +149,13 @@ class Constraints:
     def active_ties(self, values: Mapping[str, Any]) -> list[Tie]:
         """Ties that apply to a model with the given parameters."""
         return [tie for tie in self.ties if {tie.name, *tie.names} <= values.keys()]
+
+    def weaken(self, *weak: Prior) -> "Constraints":
+        """Return the constraints with some priors so wide that only what nothing else determines depends on them."""
+        priors = [
+            replace(prior, covariance=_WEAK**2 * prior.covariance) if prior in weak else prior for prior in self.priors
+        ]
+        return replace(self, priors=priors)
 
     def tied_values(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """Parameter values [SI] by name, with the values of tied parameters computed from the others."""

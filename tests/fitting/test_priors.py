@@ -39,7 +39,7 @@ def test_a_prior_weighs_as_one_more_measurement_of_the_parameter(measured, paper
     covariances = [covariance(fit.model, stage) for fit in (plain, fitted)]
     before, after = (known.stderr("alpha") or 0.0 for known in covariances)
     assert after == pytest.approx(np.hypot(before, error) / 2.0, rel=0.03)
-    share = prior_uses(fitted, covariances[1])["alpha"].share
+    share = prior_uses([fitted], None)["alpha"].share
     assert share == pytest.approx(before**2 / (before**2 + error**2), rel=0.03)
 
 
@@ -80,7 +80,7 @@ def test_the_model_of_earlier_tests_is_a_prior_that_counts_as_these_tests(rig, t
 
 def test_tests_contradict_a_wrong_prior_and_no_right_one(rig, paper_model):
     truth = paper_model.values["alpha"]
-    for shift, contradicts in ((0.5, False), (-9.0, True), (9.0, True)):
+    for shift, contradicts in ((0.5, False), (-6.0, True), (6.0, True)):
         found = _fitted(rig(4), alpha=ParameterSetting(prior=f"{truth + 0.004 * shift} +- 0.004"))
         assert any(warning.kind == "prior_contradicted" for warning in found.warnings) == contradicts
 
