@@ -31,7 +31,7 @@ from bushfit.export.deck import (
     table_omissions,
     write_deck,
 )
-from bushfit.export.prony import COMPOUND, LONG_TERM, PronySeries, prony_omissions, prony_series, shear_strain
+from bushfit.export.prony import COMPOUND, LONG_TERM, PronySeries, prony_omissions, prony_series
 from bushfit.units import number
 
 #: Number of constants of a symmetric 6 x 6 matrix, and of values per data line.
@@ -96,7 +96,7 @@ def _materials(request: ExportRequest, units: UnitSystem, series: Sequence[Prony
     model, first = request.result.model.without(EffectLevel.INSTRUMENT), exported_directions(request)[0]
     long_term = series[0].long_term if series else model.values[LONG_TERM]
     for rank, table in enumerate(stiffness_tables(first), start=1):
-        strain = shear_strain(request, table.amplitude)
+        strain = 2.0 * table.amplitude * model.unit_strain(first.direction)  # engineering shear strain
         about = f"shear strain amplitude {number(100.0 * strain, 6)} %, from {describe_amplitudes((table,))}"
         yield from comment_lines("**", [f"COMPOUND_{rank}: {about}"])
         yield f"*MATERIAL, NAME=COMPOUND_{rank}"

@@ -19,7 +19,6 @@ import uuid
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 from bushfit.errors import OutputError
 from bushfit.export.contract import Exported, ExportRequest
@@ -165,11 +164,7 @@ def model_files(request: ExportRequest, model: TimeModel, name: str, guid: str) 
         "base_units": _BASE_UNITS,
         "offset": _OFFSET,
         "directions": [neutral | {field: reference[key] for field, key in fields.items()} for fields in model.fields],
-        "finalize": _xml_text,
+        # characters that XML does not allow become underscores; numbers and XML remain unchanged
+        "finalize": lambda value: _NO_XML.sub("_", value) if type(value) is str else value,
     }
     return {file: render_template(_FOLDER / f"{file}.jinja", **context).encode() for file in _WRITTEN}
-
-
-def _xml_text(value: Any) -> Any:
-    """Replace characters in a text that XML does not allow by underscores; numbers and XML remain unchanged."""
-    return _NO_XML.sub("_", value) if isinstance(value, str) and not hasattr(value, "__html__") else value

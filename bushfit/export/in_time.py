@@ -105,7 +105,7 @@ def time_model(request: ExportRequest) -> TimeModel:
     frequencies = np.concatenate([*(prediction.frequency for prediction in request.predictions), *fitted])
     band = float(frequencies.min()) / 100.0, float(frequencies.max()) * 10.0
     arms = model_arms(model, band, request.accuracy, conditions)
-    values, names = _values(request, model, arms)
+    values, fields = _values(request, model, arms)
     omissions = [Caveat("format_error", f"{part.sentence}; slower relaxation is left out") for part in arms]
     for prediction in request.predictions:
         omissions += [*_steady_omissions(model, omitted, prediction, conditions), *band_omissions(prediction)]
@@ -115,7 +115,6 @@ def time_model(request: ExportRequest) -> TimeModel:
         for index, part in enumerate(arms)
         for modulus, time in zip(part.modulus, part.time, strict=True)
     ]
-    fields = [_fields(model, place, of_place, arms) for place, of_place in zip(request.places, names, strict=True)]
     tubes = [(bushing_at(model.bushing, place), place) for place in request.places]
     levers = [tube.outer_radius if tube and place.is_rotation else 1.0 for tube, place in tubes]
     return TimeModel(request.places, values, fields, levers, arms, arm_rows, omissions)
@@ -136,7 +135,7 @@ def middle_point(prediction: Prediction) -> tuple[float, float]:
 def _values(
     request: ExportRequest, model: Model, arms: tuple[Arms, ...]
 ) -> tuple[tuple[FmuValue, ...], list[dict[str, str]]]:
-    """List the values of the FMU, and the name of the value that each parameter has in each direction or specimen.
+    """List the values of the FMU, and for each direction or specimen the values that its C structure takes.
 
     If a parameter differs between places (directions or specimens), each place has a value `<parameter>.<place>`.
 
@@ -146,61 +145,44 @@ def _values(
         arms: Maxwell arms that replace viscoelastic effects.
 
     Returns:
-        Values, constants first; and for each place, name of the value by qualified parameter name.
+        Values, constants first; and for each place, name of the value by field of the C structure, such as
+        {"unit_strain": "unit_strain.axial", "size[0]": "m"}.
     """
     places = request.places
     local_values = [
         model.values_at(prediction.direction, *middle_point(prediction), request.conditions)
         for prediction in request.predictions
     ]
-    fitted_sizes = {part.size for part in arms}
+    size_fields = {part.size: f"size[{index}]" for index, part in enumerate(arms)}
     sizes = {qualified_size(branch) for branch in model.structure.viscoelastic}
     values: dict[FmuValue, None] = {}
-    names = [dict[str, str]() for _ in places]
+    fields = [dict[str, str]() for _ in places]
     for effect in model.records:
         size = qualified_size(effect) if isinstance(effect, Branch) and effect.size else None
-        if isinstance(effect, Modifier) or (size and size not in fitted_sizes):
+        if isinstance(effect, Modifier) or (size and size not in size_fields):
             continue
-        for parameter in effect.parameters:
+        effect_fields = fields_of(effect) or [""] * len(effect.parameters)
+        for parameter, field in zip(effect.parameters, effect_fields, strict=True):
             key = qualified_name(effect, parameter)
             shared = len({local[key] for local in local_values}) == 1
-            for place, local, place_names in zip(places, local_values, names, strict=True):
+            for place, local, place_fields in zip(places, local_values, fields, strict=True):
                 name, value = key if shared else f"{key}.{place}", local[key]
                 limits = (*parameter.bounds, value, value if parameter.neutral is None else parameter.neutral)
                 bounds, settable = (min(limits), max(limits)), size is None or key in sizes
                 values[FmuValue(name, parameter.unit, value, bounds, parameter.meaning, settable)] = None
-                place_names[key] = name
-    for place, place_names in zip(places, names, strict=True):
+                if key in size_fields:
+                    place_fields[size_fields[key]] = name
+                if field and effect.acts_at(place) and place_suffix(effect.name) in (None, str(place)):
+                    place_fields[field] = name
+    for place, place_fields in zip(places, fields, strict=True):
         unit = f"1/{place.motion.displacement_unit}" if place.motion.displacement_unit != "1" else "1"
         for key, key_unit, value, meaning in (
             ("unit_strain", unit, model.unit_strain(place), "equivalent strain per displacement, rotation or strain"),
             ("stiffness_per_modulus", "", model.stiffness_per_modulus(place), "stiffness per equivalent shear modulus"),
         ):
-            place_names[key] = f"{key}.{place}"
-            values[FmuValue(place_names[key], key_unit, value, (1e-12, 1e12), meaning)] = None
-    return tuple(sorted(values, key=lambda value: value.settable)), names
-
-
-def _fields(model: Model, place: Place, names: Mapping[str, str], arms: tuple[Arms, ...]) -> dict[str, str]:
-    """Map the fields of the C structure of one direction or specimen to the names of the FMU values that they take.
-
-    Args:
-        model: model in the export.
-        place: direction or specimen.
-        names: name of the FMU value of each parameter.
-        arms: Maxwell arms that replace viscoelastic effects.
-
-    Returns:
-        Name of the FMU value by field, such as {"unit_strain": "unit_strain.axial", "size[0]": "m"}.
-    """
-    fields = {key: names[key] for key in ("unit_strain", "stiffness_per_modulus")}
-    fields |= {f"size[{index}]": names[part.size] for index, part in enumerate(arms)}
-    for effect in model.records:
-        acts = effect.acts_at(place) and place_suffix(effect.name) in (None, str(place))
-        if acts and not isinstance(effect, Modifier) and fields_of(effect):
-            parameters = (names[qualified_name(effect, parameter)] for parameter in effect.parameters)
-            fields |= dict(zip(fields_of(effect), parameters, strict=True))
-    return fields
+            place_fields[key] = f"{key}.{place}"
+            values[FmuValue(place_fields[key], key_unit, value, (1e-12, 1e12), meaning)] = None
+    return tuple(sorted(values, key=lambda value: value.settable)), fields
 
 
 def _steady_omissions(

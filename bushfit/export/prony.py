@@ -58,11 +58,6 @@ class PronySeries:
     relative_moduli: Array
 
 
-def shear_strain(request: ExportRequest, amplitude: float) -> float:
-    """Engineering shear strain amplitude of the rubber at an amplitude [m, rad or 1] of the first direction."""
-    return 2.0 * amplitude * request.result.model.unit_strain(request.places[0])
-
-
 @lru_cache(maxsize=1)
 def prony_series(request: ExportRequest) -> list[PronySeries]:
     """Fit a Prony series at each amplitude of the first direction or specimen, over the frequencies of the grid.
@@ -85,7 +80,7 @@ def prony_series(request: ExportRequest) -> list[PronySeries]:
     band = float(prediction.frequency.min()), float(prediction.frequency.max())
     frequency, series = np.geomspace(*band, _FINE), list[PronySeries]()
     for amplitude in np.unique(prediction.amplitude):
-        strain = shear_strain(request, amplitude)
+        strain = 2.0 * amplitude * model.unit_strain(request.places[0])  # engineering shear strain
 
         def relaxing_modulus(omega: Array, strain: float = strain) -> Array:
             """Complex modulus minus the long-term modulus [Pa], by angular frequency [rad/s] and strain amplitude."""

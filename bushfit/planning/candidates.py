@@ -69,14 +69,9 @@ def paper_tests(knowledge: Knowledge, rig: RigSettings, place: Place) -> list[Te
     if tube and place.axis is Direction.RADIAL:  # the paper's radial displacements are axial
         scale = _PAPER_STRAIN / tube.unit_strain(Direction.AXIAL)
     sweep = PAPER_SWEEPS[0]
-    tests: list[Test] = [
-        *(
-            replace(loop, direction=place, amplitude=_round_to_set_point(loop.amplitude * scale))
-            for loop in PAPER_LOOPS
-        ),
-        *(replace(sweep, direction=place, amplitudes=(_round_to_set_point(x * scale),)) for x in sweep.amplitudes),
-    ]
-    return _tests_within_limits(knowledge, rig, tests)
+    loops = [replace(loop, direction=place, amplitude=float(f"{loop.amplitude * scale:.2g}")) for loop in PAPER_LOOPS]
+    sweeps = [replace(sweep, direction=place, amplitudes=(float(f"{x * scale:.2g}"),)) for x in sweep.amplitudes]
+    return _tests_within_limits(knowledge, rig, [*loops, *sweeps])
 
 
 def candidates(knowledge: Knowledge, request: PlanRequest) -> list[Test]:
@@ -105,10 +100,10 @@ def candidates(knowledge: Knowledge, request: PlanRequest) -> list[Test]:
         predicted_rates, predicted_sizes = request.grids.get(place, ((), ()))
         sizes = np.concatenate([predicted_sizes, *(test.amplitudes for test in standard)])
         rates = np.concatenate([predicted_rates, *(test.frequencies for test in standard)])
-        amplitudes = [_round_to_set_point(x) for x in np.geomspace(sizes.min(), 2.0 * sizes.max(), 6)]
+        amplitudes = [float(f"{x:.2g}") for x in np.geomspace(sizes.min(), 2.0 * sizes.max(), 6)]
         top = min(2.0 * float(rates.max()), rig.max_frequency or float(rates.max()))
         even = np.geomspace(0.2 * rates.min(), top, 7)
-        frequencies = [min(_round_to_set_point(f), top) for f in (*even[:-1], 0.7 * top, 0.8 * top, 0.9 * top, top)]
+        frequencies = [min(float(f"{f:.2g}"), top) for f in (*even[:-1], 0.7 * top, 0.8 * top, 0.9 * top, top)]
         steps = [tuple(sorted({frequencies[i] for i in chosen})) for chosen in _FREQUENCY_CHOICES]
         further: list[Test] = [SimulatedSweep(place, (x,), stepped) for x in amplitudes for stepped in steps]
         further += [SimulatedSweep(place, tuple(amplitudes), (frequencies[i],), "amplitude") for i in (0, 2, 4, 9)]
@@ -150,11 +145,6 @@ def _tests_within_limits(knowledge: Knowledge, rig: RigSettings, tests: Sequence
             by_frequency = test.stepped == "frequency"
             possible.append(replace(test, frequencies=steps) if by_frequency else replace(test, amplitudes=steps))
     return possible
-
-
-def _round_to_set_point(value: float) -> float:
-    """Round a value to two significant digits."""
-    return float(f"{value:.2g}")
 
 
 def unlimited_rig_warning(knowledge: Knowledge, rig: RigSettings, tests: Sequence[Test]) -> Caveat | None:

@@ -81,13 +81,6 @@ class Budget:
         """Total duration [min], with set-ups, if each test is run `counts` times, (tests,)."""
         return float(self.minutes @ counts) + self.setup_minutes * np.unique(self.place[counts > 0]).size
 
-    def minutes_of_one_more(self, counts: Array) -> Array:
-        """Additional duration [min] if a test is run once more than in `counts`, (tests,); infinite if not allowed."""
-        more = self.minutes + self.setup_minutes * ~np.isin(self.place, self.place[counts > 0])
-        has_run = np.isin(self.alternative, self.alternative[counts > 0])
-        barred = has_run & (counts == 0) | (counts >= self.maximum_runs)
-        return np.where(barred | (self.total_minutes(counts) + more > self.maximum_minutes), np.inf, more)
-
 
 def best_runs(search: PlanSearch, start: Array, minimum_runs: Array) -> Array:
     """Find the number of runs of each test that minimises the objective of a search within the available hours.
@@ -138,10 +131,15 @@ def add_runs(
         Number of runs of each test with the added runs, (tests,).
     """
     counts, value = counts.copy(), search.objective(counts)
-    while not enough(counts) and np.isfinite(minutes := budget.minutes_of_one_more(counts)).any():
-        values = search.objectives_with_one_more(counts)
-        decrease = (value - values) / minutes
-        best = int(np.argmax(np.where(np.isfinite(minutes), decrease, -np.inf)))
+    while not enough(counts):
+        run = counts > 0
+        minutes = budget.minutes + budget.setup_minutes * ~np.isin(budget.place, budget.place[run])
+        barred = np.isin(budget.alternative, budget.alternative[run]) & ~run | (counts >= budget.maximum_runs)
+        barred |= budget.total_minutes(counts) + minutes > budget.maximum_minutes
+        if barred.all():
+            break
+        values = search.objectives(counts, one_more=True)
+        best = int(np.argmax(np.where(barred, -np.inf, (value - values) / minutes)))
         if value - values[best] <= _USEFUL_DECREASE:
             break
         counts[best] += 1

@@ -96,31 +96,21 @@ class ModelInformation:
         decrease = np.sum(shared[..., 2 + k :] * solved[..., 2 + k :], axis=-2)
         return Information(remaining[..., :k], remaining[..., k:], self.squares * counts[:, None] - decrease)
 
-    def total(self, counts: Array) -> Information:
+    def total(self, counts: Array, *, one_more: bool = False) -> Information:
         """Fisher information of the prior and all runs together.
 
         Args:
             counts: number of runs of each candidate test, (tests,).
+            one_more: True to add one more run of each test in turn.
 
         Returns:
-            Information with one entry (choice).
+            Information with one entry (choice); with `one_more`, with an entry for each test that is run once more.
         """
-        parameters, cross, squares = (part.sum(axis=0, keepdims=True) for part in self.of_runs(counts))
-        return Information(parameters + self.prior, cross, squares)
-
-    def with_one_more(self, counts: Array) -> Information:
-        """Fisher information of the prior and all runs, with one more run of each test in turn.
-
-        Args:
-            counts: number of runs of each test before this run, (tests,).
-
-        Returns:
-            Information with one entry (choice) for each test that is run once more.
-        """
-        total, now, more = self.total(counts), self.of_runs(counts), self.of_runs(counts + 1)
-        return Information(
-            *(all_tests + (after - before) for all_tests, before, after in zip(total, now, more, strict=True))
-        )
+        runs = self.of_runs(counts)
+        total = [part.sum(axis=0, keepdims=True) for part in runs]
+        if one_more:
+            total = [part + (more - now) for part, now, more in zip(total, runs, self.of_runs(counts + 1), strict=True)]
+        return Information(total[0] + self.prior, *total[1:])
 
     def error_covariance(self, information: Information) -> Array:
         """Compute the covariance of the parameters' relative errors that a fit of the tests will have.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import chain, cycle
@@ -23,7 +23,7 @@ from bushfit.model.result import Range, Result
 from bushfit.planning.candidates import candidates, standard_tests
 from bushfit.planning.contract import Knowledge, PlanRequest, Test
 from bushfit.planning.exchange import Budget, best_runs
-from bushfit.planning.information import CandidateGrid, Information, ModelInformation, rival_chi_squares
+from bushfit.planning.information import CandidateGrid, ModelInformation, rival_chi_squares
 from bushfit.planning.targets import UNLIMITED_RUNS, PlannedQuantity
 from bushfit.prediction.caveats import unfitted_warnings
 
@@ -135,32 +135,30 @@ class PlanSearch:
 
     def objective(self, counts: Array) -> float:
         """Objective that the plan minimises (see `objectives`) for `counts` runs of each test, (tests,)."""
-        return float(self.objectives([model.total(counts) for model in self.models])[0])
+        return float(self.objectives(counts)[0])
 
-    def objectives_with_one_more(self, counts: Array) -> Array:
-        """Objective (see `objectives`) with one run of each test in turn added to `counts`, (tests,)."""
-        return self.objectives([model.with_one_more(counts) for model in self.models])
-
-    def objectives(self, informations: Sequence[Information]) -> Array:
-        """Compute the objective that the plan minimises for several choices of tests.
+    def objectives(self, counts: Array, *, one_more: bool = False) -> Array:
+        """Compute the objective that the plan minimises.
 
         It is the logarithm of a weighted parameter variance, or of the entropy of the rival models, plus a penalty for
         each missing effect that the tests would detect less well than the standard programme does.
 
         Args:
-            informations: information on each model, in the order of `models`, with a first axis over the choices.
+            counts: number of runs of each test, (tests,).
+            one_more: True to add one run of each test in turn.
 
         Returns:
-            Objective for each choice, (choices,).
+            Objective, (1,); with `one_more`, for each test that is run once more, (tests,).
         """
+        likeliest, *rivals = (model.total(counts, one_more=one_more) for model in self.models)
         if self.weight is None:
             probabilities = [rival.probability for rival in self.knowledge.rivals]
-            entropy = remaining_entropy(probabilities, rival_chi_squares(informations[1:]))
+            entropy = remaining_entropy(probabilities, rival_chi_squares(rivals))
             aim = np.log(np.maximum(entropy, np.finfo(float).tiny))
         else:
-            aim = np.log(np.einsum("tij,ij->t", self.models[0].error_covariance(informations[0]), self.weight))
+            aim = np.log(np.einsum("tij,ij->t", self.models[0].error_covariance(likeliest), self.weight))
         wanted = self.minimum_noncentrality > 0.0
-        share = informations[0].noncentralities()[:, wanted] / self.minimum_noncentrality[wanted]
+        share = likeliest.noncentralities()[:, wanted] / self.minimum_noncentrality[wanted]
         return aim - self.penalty * np.sum(np.log(np.clip(share, 1e-12, 1.0)), axis=1)  # finite
 
     @cached_property
@@ -195,7 +193,7 @@ class PlanSearch:
         """
         required = np.zeros(len(self.tests), dtype=int)
         if self.goals:
-            values = self.objectives_with_one_more(required)
+            values = self.objectives(required, one_more=True)
             for goal in self.goals:
                 chosen = np.array([test.direction == goal.place for test in self.tests])
                 chosen &= self.budget.maximum_runs > 0
@@ -218,7 +216,7 @@ class PlanSearch:
         if self.request.aim == "rivals":
             return self.nearest_rivals(counts) >= 2.0 * RIVALS_APART
         covariance = self.error_covariance(counts)
-        reached = all(goal.nearly_meets_target(covariance, self.limit_covariance) for goal in self.goals)
+        reached = all(goal.meets_target(covariance, self.limit_covariance) for goal in self.goals)
         testable = [goal for goal in self.goals if goal.place in self.request.places]
         if not self.goals or not reached or any(self.untested_warning(goal, counts) for goal in testable):
             return False
@@ -360,10 +358,6 @@ class PlanSearch:
         names = (*self.knowledge.names, *self.knowledge.bounded)
         return np.diag(np.isin(names, self.request.parameters).astype(float))
 
-    def rival_distances(self, counts: Array) -> Array:
-        """Expected chi-square between any two rival models, (rivals, rivals), for runs `counts`, (tests,)."""
-        return np.asarray(rival_chi_squares([model.total(counts) for model in self.models[1:]])[0])
-
     @cached_property
     def separable_rivals(self) -> Array:
         """Mask of the pairs of rival models that all candidate tests together can distinguish, (rivals, rivals).
@@ -374,12 +368,14 @@ class PlanSearch:
         pairs = np.triu(np.ones((rivals, rivals), dtype=bool), 1)
         if not rivals:
             return pairs
-        separable = pairs & (self.rival_distances(np.ones(len(self.tests), dtype=int)) >= RIVALS_APART)
+        chi_square = rival_chi_squares([model.total(np.ones(len(self.tests), dtype=int)) for model in self.models[1:]])
+        separable = pairs & (chi_square[0] >= RIVALS_APART)
         return separable if separable.any() else pairs
 
     def nearest_rivals(self, counts: Array) -> float:
         """Smallest expected chi-square between separable rival models, for runs `counts`, (tests,)."""
-        return float(self.rival_distances(counts)[self.separable_rivals].min())
+        chi_square = rival_chi_squares([model.total(counts) for model in self.models[1:]])[0]
+        return float(chi_square[self.separable_rivals].min())
 
 
 def freedom_per_repeat(test: Test) -> int:

@@ -114,19 +114,17 @@ class PlannedQuantity:
         """Relative half width of the widest 95 % interval, from the parameters' covariance, (k, k)."""
         return float(self.half_widths(error_covariance).max())
 
-    def meets_target(self, error_covariance: Array) -> bool:
-        """True if all 95 % intervals are as narrow as the target, given the covariance of the parameters, (k, k)."""
-        return self.half_width(error_covariance) <= self.target * (1.0 + 1e-9)
-
-    def nearly_meets_target(self, error_covariance: Array, limit: Array) -> bool:
-        """True if tests meet the target, or miss it by at most 1.1 times the half width of unlimited tests.
+    def meets_target(self, error_covariance: Array, limit: Array | None = None) -> bool:
+        """Check that all 95 % intervals are as narrow as the target.
 
         Args:
             error_covariance: covariance of the parameters with the tests, (k, k).
-            limit: covariance of the parameters with unlimited tests, (k, k).
+            limit: covariance of the parameters with unlimited tests, (k, k). If these miss the target, too, the tests
+                meet it with up to 1.1 times the half width of unlimited tests. None to require the target.
         """
-        nearly = self.half_width(error_covariance) <= _NEARLY * self.half_width(limit)
-        return self.meets_target(error_covariance) or (not self.meets_target(limit) and nearly)
+        width, target = self.half_width(error_covariance), self.target * (1.0 + 1e-9)
+        limit_width = 0.0 if limit is None else self.half_width(limit)
+        return width <= target or (target < limit_width and width <= _NEARLY * limit_width)
 
     def weight(self, limit: Array) -> Array:
         """Compute the matrix W of the search's objective trace(W covariance) for this target.
