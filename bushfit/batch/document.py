@@ -1,6 +1,5 @@
 """JSON file of one part of a batch, `row.json`; `report.batch_document` defines the file of the whole batch."""
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
@@ -29,19 +28,6 @@ class Estimate:
     high: float | None = None
     stderr: float | None = None
     unit: str = "1"
-
-    @classmethod
-    def finite(cls, value: float, low: float | None, high: float | None, stderr: float | None, unit: str) -> "Estimate":
-        """Make an estimate whose interval and standard error are None where they are not finite.
-
-        Args:
-            value: the value, in `unit`.
-            low, high: ends of the 95 % interval, in `unit`.
-            stderr: standard error, in `unit`.
-            unit: SI unit.
-        """
-        low, high, stderr = (x if x is not None and math.isfinite(x) else None for x in (low, high, stderr))
-        return cls(value, low, high, stderr, unit)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

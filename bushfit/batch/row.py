@@ -9,6 +9,8 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from bushfit.batch import store
 from bushfit.batch.document import Estimate, RowFile
 from bushfit.batch.manifest import Row, RowSettings
@@ -202,13 +204,14 @@ def estimate_quantities(result: Result, points: Sequence[Point]) -> tuple[dict[s
     Raises:
         BatchError: an amplitude with a wrong unit, such as an angle in the axial direction.
     """
-    estimates, warnings = dict[str, Estimate](), list[Sequence[Caveat]]()
-    for name, parameter in result.model.parameters.items():
-        low, high = result.interval(name) or (None, None)
-        stderr = result.covariance.stderr(name)
-        estimates[name] = Estimate.finite(result.model.values[name], low, high, stderr, parameter.unit)
+    unknown, warnings = (None, None, None), list[Sequence[Caveat]]()
+    units = {name: parameter.unit for name, parameter in result.model.parameters.items()}
+    rows: list[tuple[Any, ...]] = [
+        (name, result.model.values[name], *(result.interval(name) or unknown[:2]), result.covariance.stderr(name))
+        for name in units
+    ]
     if result.quality:
-        estimates |= {quantity.name: Estimate(getattr(result.quality, key)) for key, quantity in FIT_QUALITY.items()}
+        rows += [(quantity.name, getattr(result.quality, key), *unknown) for key, quantity in FIT_QUALITY.items()]
     for point in points:
         places = get_places(point.place, result.specimens)
         place = places[0]
@@ -220,9 +223,12 @@ def estimate_quantities(result: Result, points: Sequence[Point]) -> tuple[dict[s
             expected = f"an amplitude in {place.display.displacement.name}"
             raise BatchError(problem, found=str(point), expected=expected)
         predicted = predict_stiffness(result, place, [point.frequency], [point.amplitude])
-        bands, units = (predicted.stiffness, predicted.loss_factor), (place.motion.stiffness_unit, "1")
-        for name, band, unit in zip((STIFFNESS, LOSS_FACTOR), bands, units, strict=True):
-            value, low, high = band.ends[:, 0].tolist()
-            estimates[f"{name} {point}"] = Estimate.finite(value, low, high, None, unit)
+        bands = {f"{STIFFNESS} {point}": predicted.stiffness, f"{LOSS_FACTOR} {point}": predicted.loss_factor}
+        rows += [(name, *band.ends[:, 0].tolist(), None) for name, band in bands.items()]
+        units[f"{STIFFNESS} {point}"] = place.motion.stiffness_unit
         warnings.append(predicted.warnings)
+    estimates = {}
+    for name, value, *ends in rows:
+        low, high, stderr = (x if x is not None and np.isfinite(x) else None for x in ends)
+        estimates[name] = Estimate(value, low, high, stderr, units.get(name, "1"))
     return estimates, warnings

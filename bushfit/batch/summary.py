@@ -75,9 +75,8 @@ class BatchPlan:
     formats: Formats
 
 
-@dataclass(frozen=True, eq=False)
 class BatchResult:
-    """Results of all n rows of a batch.
+    """Results of all n rows of a batch: estimates, and the comparison of the parts with limits and with each other.
 
     Args:
         plan: settings of the batch.
@@ -85,90 +84,63 @@ class BatchResult:
         kept_count: number of rows kept from an earlier run.
         seconds: duration of the run [s].
         notes: warnings on results of an earlier batch in the folder.
+
+    Attributes:
+        estimates: value, low and high end of the 95 % interval, and standard error of each quantity of the parts [SI]
+            by its name, (4, n); numbers that are not known are NaN.
+        quantities: parameters, measures of the fit, and stiffness and loss factor at the stated points, by name.
+        allowed: lowest and highest allowed value of each quantity with limits [SI].
+        is_poor: True for each part with a poor fit (NRMSE above its limit, reduced chi-square of 2 or more), (n,).
+        curves: columns of measured |K| for the batch table, by header: a value per part, (n,), NaN if not measured.
+            There is a column for each point of the measured stiffness curve that most parts have in common.
+        lacks_sweep: True for each evaluated part without a sweep if the other parts have one: its fit is not
+            comparable, (n,).
+        curve_deviation: relative deviation of |K| of each part from the median of the parts, averaged over the curve,
+            (n,).
+        compared_values: values and standard errors for the comparison of the parts, by name of the quantity, (n,) each.
+            Measures of the fit are left out. Values of poor fits, of parts that lack a sweep, and parameters at a bound
+            are NaN, and so are parameters of a model with an unnamed correction, because they contain a part of the
+            gap.
+        deviations: deviation of each part from the others in standard deviations, by quantity, (n,).
+        outliers: mask of the parts that deviate beyond chance, by quantity, (n,).
     """
 
-    plan: BatchPlan
-    records: Sequence[RowFile]
-    kept_count: int
-    seconds: float
-    notes: Sequence[Caveat]
-
-    @cached_property
-    def estimates(self) -> dict[str, Array]:
-        """Value, low and high end of the 95 % interval, and standard error of each quantity of n parts [SI], (4, n).
-
-        The keys are the names of the quantities; numbers that are not known are NaN.
-        """
-        names, unknown = dict.fromkeys(name for record in self.records for name in record.quantities), Estimate(np.nan)
-        estimates = {name: [record.quantities.get(name, unknown) for record in self.records] for name in names}
-        numbers = attrgetter("value", "low", "high", "stderr")
-        return {name: np.array([*map(numbers, parts)], dtype=float).T for name, parts in estimates.items()}
-
-    @cached_property
-    def is_poor(self) -> Array:
-        """True for each part with a poor fit (NRMSE above its limit, reduced chi-square of 2 or more), (n,)."""
-        return np.array([bool(describe_poor_fit(record, self.plan.limits)) for record in self.records])
-
-    @cached_property
-    def lacks_sweep(self) -> Array:
-        """True for each evaluated part without a sweep if the other parts have one: its fit is not comparable, (n,)."""
-        return np.array([bool(self.curves) and record.status == "done" and not record.curve for record in self.records])
-
-    @cached_property
-    def quantities(self) -> dict[str, PartQuantity]:
-        """Quantities by name: parameters, measures of the fit, and stiffness and loss factor at the stated points."""
-        return list_quantities(self.estimates, self.plan.task.points)
-
-    @cached_property
-    def allowed(self) -> tuple[dict[str, tuple[float, float]], list[Caveat]]:
-        """Lowest and highest allowed value of each quantity with limits [SI], and warnings on limits not judged."""
-        values = {name: column[0] for name, column in self.estimates.items()}
-        return resolve_limits(self.plan.limits, values) if self.plan.limits else ({}, [])
-
-    @cached_property
-    def curves(self) -> dict[str, Array]:
-        """Columns of measured |K| for the batch table, by header: a value per part, (n,), NaN if not measured.
-
-        There is a column for each point of the measured stiffness curve that most parts have in common.
-        """
-        shared, curves = Counter(tuple(record.curve) for record in self.records if record.curve), dict[str, Array]()
+    def __init__(
+        self, plan: BatchPlan, records: Sequence[RowFile], kept_count: int, seconds: float, notes: Sequence[Caveat]
+    ) -> None:
+        self.plan, self.records, self.kept_count, self.seconds = plan, records, kept_count, seconds
+        unknown, numbers = Estimate(np.nan), attrgetter("value", "low", "high", "stderr")
+        self.estimates = {
+            name: np.array([numbers(record.quantities.get(name, unknown)) for record in records], dtype=float).T
+            for name in dict.fromkeys(name for record in records for name in record.quantities)
+        }
+        self.quantities = list_quantities(self.estimates, plan.task.points)
+        values = {name: rows[0] for name, rows in self.estimates.items()}
+        self.allowed, limit_notes = resolve_limits(plan.limits, values) if plan.limits else ({}, [])
+        self._notes = [*limit_notes, *notes]
+        self.is_poor = np.array([bool(describe_poor_fit(record, plan.limits)) for record in records])
+        shared, self.curves = Counter(tuple(record.curve) for record in records if record.curve), dict[str, Array]()
         points, sharing = max(shared.items(), key=lambda item: item[1], default=((), 0))
         for point in points if sharing >= FEWEST else ():
             quantity = point_quantity(parse_point(point), STIFFNESS)
-            measured = np.array([record.curve.get(point, np.nan) for record in self.records])
-            curves[f"measured {quantity.header}"] = quantity.factor * measured
-        return curves
-
-    @cached_property
-    def curve_deviation(self) -> Array:
-        """Relative deviation of |K| of each part from the median of the parts, averaged over the curve, (parts,)."""
-        if not self.curves:
-            return np.full(len(self.records), np.nan)
-        logarithms = np.log([*self.curves.values()])
-        return np.expm1((logarithms - np.nanmedian(logarithms, axis=1, keepdims=True)).mean(axis=0))
-
-    @cached_property
-    def compared_values(self) -> dict[str, tuple[Array, Array]]:
-        """Values and standard errors for the comparison of the parts, by name of the quantity, (n,) each.
-
-        Measures of the fit are left out. Values of poor fits, of parts that lack a sweep, and parameters at a bound are
-        NaN, and so are parameters of a model with an unnamed correction, because they contain a part of the gap.
-        """
+            measured = np.array([record.curve.get(point, np.nan) for record in records])
+            self.curves[f"measured {quantity.header}"] = quantity.factor * measured
+        lacking = [bool(self.curves) and record.status == "done" and not record.curve for record in records]
+        self.lacks_sweep, self.curve_deviation = np.array(lacking), np.full(len(records), np.nan)
+        if self.curves:
+            logarithms = np.log([*self.curves.values()])
+            self.curve_deviation = np.expm1((logarithms - np.nanmedian(logarithms, 1, keepdims=True)).mean(axis=0))
         compared = dict[str, tuple[Array, Array]]()
         for name in (name for name in self.quantities if name in self.estimates and name not in FIT_NAMES):
             value, low, high, stderr = self.estimates[name]
             is_unknown = (self.is_poor | self.lacks_sweep) | [
-                name in record.at_bound or (is_parameter(name) and UNNAMED in record.effects) for record in self.records
+                name in record.at_bound or (is_parameter(name) and UNNAMED in record.effects) for record in records
             ]
             errors = np.where(np.isfinite(stderr), stderr, (high - low) / (2.0 * Z95))
             compared[name] = np.where(is_unknown, np.nan, value), errors
-        compared[_CURVE] = self.curve_deviation, np.full(len(self.records), np.nan)
-        return {name: pair for name, pair in compared.items() if np.isfinite(pair[0]).sum() >= FEWEST}
-
-    @cached_property
-    def outliers(self) -> tuple[dict[str, Array], dict[str, Array]]:
-        """Deviation of each part from the others in standard deviations, and mask of outliers, by quantity, (n,)."""
-        return find_outliers(self.compared_values)
+        compared[_CURVE] = self.curve_deviation, np.full(len(records), np.nan)
+        self.compared_values = {name: pair for name, pair in compared.items() if np.isfinite(pair[0]).sum() >= FEWEST}
+        self.deviations, self.outliers = find_outliers(self.compared_values)
 
     @cached_property
     def document(self) -> BatchFile:
@@ -231,10 +203,10 @@ class BatchResult:
         if name in self.compared_values:
             compared = self.compared_values[name][0]
             limit = smallest_deviation(int(np.isfinite(compared).sum()), len(self.compared_values))
-            usual = usual_parts(compared, name, self.outliers[1])
+            usual = usual_parts(compared, name, self.outliers)
             detectable = limit and limit * float(values[usual].std(ddof=1))
         bounds = self.plan.limits.bounds.get(name) if self.plan.limits and name not in FIT_NAMES else None
-        low, high = self.allowed[0].get(name, (-np.inf, np.inf))
+        low, high = self.allowed.get(name, (-np.inf, np.inf))
         fixed = bounds.fixed if bounds else (-np.inf, np.inf)
         median, sigma = median_and_scatter(known_values)
         cp, cpk = capability(known_values, *(end * column.factor for end in fixed))
@@ -254,9 +226,8 @@ class BatchResult:
         row, record, limits = self.plan.rows[index], self.records[index], self.plan.limits
         result, misses, doubtful = None, dict[str, str](), dict[str, str]()
         if limits and record.status == "done":
-            result, misses, doubtful = judge_part(record, limits, self.allowed[0], self.quantities)
-        deviations, outliers = self.outliers
-        outlying = {name: float(deviations[name][index]) for name, differs in outliers.items() if differs[index]}
+            result, misses, doubtful = judge_part(record, limits, self.allowed, self.quantities)
+        outlying = {name: float(z[index]) for name, z in self.deviations.items() if self.outliers[name][index]}
         outlying = dict(sorted(outlying.items(), key=lambda item: (not is_parameter(item[0]), -abs(item[1]))))
         relative = {_CURVE: self.curve_deviation[index]}
         for name in outlying.keys() - {_CURVE}:
@@ -329,7 +300,7 @@ class BatchResult:
         if lacking := [part.name for part, lacks in zip(parts, self.lacks_sweep, strict=True) if lacks]:
             sentence = f"no sweep, unlike the other parts, and so not compared with them: {listed(lacking)}"
             warnings.append(Caveat("part_without_sweep", sentence))
-        warnings += [*self.allowed[1], *self.notes]
+        warnings += self._notes
         if at_bound:
             clauses = [f"{parameter} of {listed(names)}" for parameter, names in at_bound.items()]
             sentence = f"at a bound of the fit, because the tests do not determine them: {'; '.join(clauses)}"
@@ -374,6 +345,6 @@ class BatchResult:
         columns["campaign name"], columns["subgroup"] = last
         columns["differs in"] = [part.differs for part in parts]
         columns["poor fit"] = [part.poor_fit for part in parts]
-        columns |= {f"robust z of {name} [-]": z for name, z in self.outliers[0].items()}
+        columns |= {f"robust z of {name} [-]": z for name, z in self.deviations.items()}
         columns |= {"measured stiffness above the median [%]": 100.0 * self.curve_deviation} if self.curves else {}
         return pd.DataFrame(columns | self.curves)
