@@ -26,7 +26,7 @@ from bushfit.reading.layout import FileFormat
 from bushfit.reading.tablefile import folder_name
 from bushfit.reduction.displacement import prepare_displacements
 from bushfit.report import plots
-from bushfit.report.response import record_table, response_table, validation_table
+from bushfit.report.response import response_table, validation_table
 from bushfit.report.results import ResultFile
 
 if TYPE_CHECKING:
@@ -163,6 +163,7 @@ def validation_files(validations: Sequence[Validation], title: str) -> list[Resu
     for validation in validations:
         name = f"validation_{folder_name(validation.record.name)}"
         record_title = f"{title}: {validation.record.name}"
-        record = ResultFile(name, "table", partial(record_table, validation))
+        table = partial(response_table, validation.record.time, [validation.response], validation.measured)
+        record = ResultFile(name, "table", table)
         files += [record, ResultFile(name, "figure", partial(draw_response, record_title, record))]
     return files

@@ -6,7 +6,7 @@ import pandas as pd
 from bushfit.geometry import Direction
 from bushfit.reduction.resonance import Resonance
 from bushfit.reduction.result import Reduction
-from bushfit.report.tables import amplitude_column, response_columns
+from bushfit.report.tables import response_columns, response_headers
 
 #: Headers of the columns on the quality and origin of each point, and the attribute of a step that fills each.
 _OF_STEPS = {
@@ -60,11 +60,12 @@ def resonance_table(resonance: Resonance) -> pd.DataFrame:
     Returns:
         A row per frequency: the columns of a sweep file, then relative error, transmissibility and averaged rows.
     """
+    place = Direction.AXIAL  # or radial: the units are the same
     return pd.DataFrame(
         {
             "frequency [Hz]": resonance.frequency,
-            **amplitude_column(Direction.AXIAL, resonance.amplitude),  # axial or radial: the units are the same
-            **response_columns(Direction.AXIAL, resonance.stiffness),
+            response_headers(place)[0]: resonance.amplitude * place.display.displacement.factor,
+            **response_columns(place, resonance.stiffness),
             "relative error [-]": resonance.relative_error,
             "transmissibility [-]": np.abs(resonance.transmissibility),
             "rows averaged": resonance.rows,

@@ -16,16 +16,17 @@ _PERCENTAGES = {
 }
 
 
-def response_table(time: Any, responses: Sequence[TimeResponse]) -> pd.DataFrame:
+def response_table(time: Any, responses: Sequence[TimeResponse], measured: Any = None) -> pd.DataFrame:
     """Table of displacement and force over time.
 
     Args:
         time: time of each row [s], (n,).
         responses: responses to histories with these times.
+        measured: measured force of a validation record [N, N m or Pa], (n,), with its single response; None without.
 
     Returns:
-        Time; then for each direction, in display units, displacement, force and its 95 % band. With several directions
-        their names begin the headers.
+        Time; then for each direction, in display units, displacement, force and its 95 % band, and measured force if
+        given. With several directions their names begin the headers.
     """
     columns = {"time [s]": time}
     for response in responses:
@@ -34,6 +35,7 @@ def response_table(time: Any, responses: Sequence[TimeResponse]) -> pd.DataFrame
         before = f"{response.direction} " if len(responses) > 1 else ""
         columns[f"{before}{moves} [{length}]"] = length_factor * response.history.value
         columns |= band_columns(f"{before}{resists} [{unit}]", response.force, force_factor)
+        columns |= {} if measured is None else {f"measured {resists} [{unit}]": force_factor * measured}
     return pd.DataFrame(columns)
 
 
@@ -49,10 +51,3 @@ def validation_table(validations: Sequence[Validation]) -> pd.DataFrame:
     """
     table = pd.DataFrame([validation.entry for validation in validations]).set_index(["test", "direction"])
     return (100.0 * table[[*_PERCENTAGES]].dropna(axis=1)).rename(columns=_PERCENTAGES).reset_index()
-
-
-def record_table(validation: Validation) -> pd.DataFrame:
-    """Table of a validation record over time: displacement, predicted force with its band, and measured force."""
-    table, place = response_table(validation.record.time, [validation.response]), validation.record.direction
-    unit, factor = place.display.force
-    return table.assign(**{f"measured {place.motion.words[1]} [{unit}]": factor * validation.measured})

@@ -57,11 +57,6 @@ class ResultFile:
         self.content: Callable[[], Any] = cache(content if callable(content) else lambda: content)
 
 
-def contents(files: Iterable[ResultFile], kind: Kind) -> dict[str, Any]:
-    """Contents of the result files of one kind, by file name without extension."""
-    return {file.name: file.content() for file in files if file.kind == kind}
-
-
 def place_names(places: Iterable[Place]) -> list[str]:
     """Unique file names, without extension, for the results of directions and specimens; valid on every system."""
     names: list[str] = []
@@ -98,12 +93,9 @@ class Formats:
         Returns:
             Functions by file name with extension: one for each picture format of a figure; none if the kind is omitted.
         """
-
-        def draw(form: Picture, chart: Chart) -> bytes:
-            """Encode a figure; the module for it imports matplotlib, which is slow."""
-            return plots.style.to_image(chart, form)
-
         name, tables = file.name, {self.table(file.name): partial(to_bytes, file.name, form=self.table_form)}
+        # the module for images imports matplotlib, which is slow
+        draw: Callable[[Picture, Chart], bytes] = lambda form, chart: plots.style.to_image(chart, form)  # noqa: E731
         figures = {f"{name}.{form}": partial(draw, form) for form in self.picture_forms}
         encoders: dict[Kind, Mapping[str, Callable[[Any], bytes]]] = {
             "json": {f"{name}.json": to_json},

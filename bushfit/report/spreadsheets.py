@@ -1,7 +1,5 @@
 """A model as tables for spreadsheets: predictions, long and wide, parameters, and provenance."""
 
-from collections.abc import Iterator
-
 import pandas as pd
 
 from bushfit.export.contract import Exported, ExportRequest
@@ -29,10 +27,20 @@ def xlsx(request: ExportRequest) -> Exported:
 
 def _tables(request: ExportRequest) -> dict[str, pd.DataFrame]:
     """Tables of an export by name: long and wide predictions of each direction or specimen, parameters, provenance."""
-    tables = {
-        "parameters": parameters_table(request.result),
-        "provenance": pd.DataFrame(_provenance_rows(request), columns=["what", "value"]),
-    }
+    result, bushing, source = request.result, request.result.model.bushing, request.source
+    sizes = ("inner_radius", "outer_radius", "length") if bushing else ()
+    origin = [
+        ("bushing", result.name),
+        *((f"{key} [m]", f"{getattr(bushing, key):.15g}") for key in sizes),
+        ("effects", ", ".join(result.model.effects)),
+        ("model", str(source.file)),
+        ("model, sha256", source.sha256),
+        *(row for file, sha256 in result.files.items() for row in (("test", file), ("test, sha256", sha256))),
+        ("bushfit", __version__),
+        *request.remarks([NO_LOOPS]),
+    ]
+    provenance = pd.DataFrame(origin, columns=["what", "value"])
+    tables = {"parameters": parameters_table(result), "provenance": provenance}
     for name, prediction in zip(place_names(request.places), request.predictions, strict=True):
         display = request.units.display(prediction.direction.motion) if request.units else None
         while {name, f"{name} wide"} & tables.keys():  # a specimen may have any name
@@ -64,20 +72,3 @@ def parameters_table(result: Result) -> pd.DataFrame:
         "meaning": [parameters[name].meaning for name in values],
     }
     return pd.DataFrame(columns)
-
-
-def _provenance_rows(request: ExportRequest) -> Iterator[tuple[str, str]]:
-    """Rows (name, value) on the origin of an export: dimensions, effects, model file, tests, version and warnings."""
-    result, bushing = request.result, request.result.model.bushing
-    yield "bushing", result.name
-    if bushing:
-        for key in ("inner_radius", "outer_radius", "length"):
-            yield f"{key} [m]", f"{getattr(bushing, key):.15g}"
-    yield "effects", ", ".join(result.model.effects)
-    yield "model", str(request.source.file)
-    yield "model, sha256", request.source.sha256
-    for file, sha256 in result.files.items():
-        yield "test", file
-        yield "test, sha256", sha256
-    yield "bushfit", __version__
-    yield from request.remarks([NO_LOOPS])

@@ -49,11 +49,6 @@ def displacement_header(place: Place) -> str:
     return f"{motion_name} [{place.display.displacement.name}]"
 
 
-def amplitude_column(place: Place, amplitude: Array) -> dict[str, Array]:
-    """Table column of amplitudes, as {header: values in display units}; `amplitude` is in SI (m, rad or 1), (n,)."""
-    return {response_headers(place)[0]: amplitude * place.display.displacement.factor}
-
-
 def response_columns(place: Place, stiffness: Array, before: str = "") -> dict[str, Array]:
     """Table columns of stiffness magnitude (display unit) and loss factor, by their headers.
 
@@ -150,14 +145,15 @@ def predicted_resonance_table(resonance: PredictedResonance) -> pd.DataFrame:
         A row per frequency: transmissibility, phase, deformation amplitude, stiffness and loss factor. If the tests do
         not show whether an effect belongs to the bushing or the rig, the same again as if it belongs to the rig.
     """
+    place = resonance.direction
     table = pd.DataFrame(
         {
             "frequency [Hz]": resonance.frequency,
             "transmissibility [-]": np.abs(resonance.transmissibility),
             "phase [deg]": np.degrees(np.angle(resonance.transmissibility)),
-            **amplitude_column(resonance.direction, resonance.amplitude),
-            **response_columns(resonance.direction, resonance.stiffness),
-            **condition_columns(resonance.conditions, resonance.direction),
+            response_headers(place)[0]: resonance.amplitude * place.display.displacement.factor,
+            **response_columns(place, resonance.stiffness),
+            **condition_columns(resonance.conditions, place),
         }
     )
     if resonance.if_in_rig:
@@ -274,7 +270,7 @@ def sweeps_table(model: Model, data_sets: Sequence[MeasuredSweep]) -> pd.DataFra
                     "direction": str(place),
                     **sweep_condition_columns(data_set),
                     "frequency [Hz]": data_set.frequency,
-                    **amplitude_column(place, data_set.amplitude),
+                    response_headers(place)[0]: data_set.amplitude * place.display.displacement.factor,
                     "repeat": data_set.repeat,
                     **response_columns(place, data_set.measured),
                     **response_columns(place, modelled, "model "),
@@ -331,7 +327,8 @@ def master_curve_table(shifted_sweeps: Sequence[ShiftedSweep]) -> pd.DataFrame:
     for shifted in shifted_sweeps:
         sweep, place = shifted.sweep, shifted.sweep.direction
         columns = {"sweep": sweep.name, "direction": str(place), "temperature [degC]": sweep.temperature - CELSIUS}
-        columns |= {"frequency [Hz]": sweep.frequency, **amplitude_column(place, sweep.amplitude)}
+        columns["frequency [Hz]"] = sweep.frequency
+        columns[response_headers(place)[0]] = sweep.amplitude * place.display.displacement.factor
         columns |= response_columns(place, sweep.measured) | {"reduced frequency [Hz]": shifted.reduced_frequency}
         tables.append(pd.DataFrame(columns | response_columns(place, shifted.reduced_stiffness, "reduced ")))
     return pd.concat(tables, ignore_index=True)

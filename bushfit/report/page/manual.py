@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -44,26 +43,20 @@ def manual_page() -> str:
     for name in names:
         text = re.sub("<!--.*?-->", "", (FOLDER / f"{name}.md").read_text(encoding="utf-8"))
         tokens = parser.parse(text)
-        title = _add_identifiers(tokens, name)
-        for token in tokens:
-            _redirect_links(token.children or (), name, names)
+        count, title = Counter[str](), name
+        for token, heading in zip(tokens, [None, *tokens], strict=False):
+            children = token.children or ()
+            if heading and heading.type == "heading_open":
+                words = "".join(part.content for part in children if part.type in ("text", "code_inline"))
+                anchor = re.sub(r"[^\w\- ]", "", words.lower()).replace(" ", "-")
+                heading.attrSet("id", f"{name}--{anchor}" + (f"-{count[anchor]}" if count[anchor] else ""))
+                count[anchor] += 1
+                title = words if heading.tag == "h1" else title
+            _redirect_links(children, name, names)
             if token.type == "table_open":  # on a narrow screen it scrolls, also by keyboard
                 token.attrSet("tabindex", "0")
         chapters.append((name, title, Markup(parser.renderer.render(tokens, parser.options, {}))))
     return render_page("manual.html", {"chapters": chapters})
-
-
-def _add_identifiers(tokens: Sequence[Token], name: str) -> str:
-    """Add identifiers to the headings of a page, and return its title."""
-    count, title = Counter[str](), name
-    for heading, text in pairwise(tokens):
-        if heading.type == "heading_open":
-            words = "".join(part.content for part in text.children or () if part.type in ("text", "code_inline"))
-            anchor = re.sub(r"[^\w\- ]", "", words.lower()).replace(" ", "-")
-            heading.attrSet("id", f"{name}--{anchor}" + (f"-{count[anchor]}" if count[anchor] else ""))
-            count[anchor] += 1
-            title = words if heading.tag == "h1" else title
-    return title
 
 
 def _redirect_links(tokens: Sequence[Token], name: str, names: Sequence[str]) -> None:

@@ -28,7 +28,7 @@ from bushfit.report.page.record import JOINT, MODELS, predict_tables, tested_tab
 from bushfit.report.page.svg import Picture, picture
 from bushfit.report.page.values import headline_texts, value_rows
 from bushfit.report.parameters import correlation_texts, effect_sizes, parameter_rows
-from bushfit.report.results import ResultFile, contents
+from bushfit.report.results import ResultFile
 from bushfit.report.tables import DISPLAYS
 from bushfit.units import number
 from bushfit.validation import validate_tables
@@ -67,7 +67,9 @@ def report_page(files: Sequence[ResultFile], date: str | None = None, folder: Pa
     Raises:
         ModelError: a document or table that is not as bushfit writes it.
     """
-    documents, tables = contents(files, "json"), contents(files, "table")
+    documents, tables = (
+        {file.name: file.content() for file in files if file.kind == kind} for kind in ("json", "table")
+    )
     paths = {name: folder / f"{name}.json" for name in documents} if folder else {}
     name = next(name for name in MODELS if name in documents)
     model, provenance = documents[name], documents[name].get("provenance", {})

@@ -5,9 +5,8 @@ from __future__ import annotations
 import io
 import json
 import re
-from collections.abc import Iterator
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 from xml.etree import ElementTree
 
 from markupsafe import Markup
@@ -55,8 +54,19 @@ def picture(chart: Chart, name: str, title: str) -> Picture:
         Title, caption and drawing for the template.
     """
     chart.arrange(texts=False)
-    image, axes = plots.style.to_image(chart, "svg", outlines=False), list(panel_axes(chart))
+    image = plots.style.to_image(chart, "svg", outlines=False)
     width, height = 72.0 * chart.get_size_inches()
+    # for the script of the page, which shows the values under the pointer: of each visible panel with lines left, top,
+    # right and bottom in the drawing [point]; limits of x and y; True or False for logarithmic x and y; labels
+    panels = []
+    for axes in chart.axes:
+        if axes.lines and axes.get_visible() and axes.get_xlabel():
+            box = axes.get_position()
+            corners = box.x0 * width, (1.0 - box.y1) * height, box.x1 * width, (1.0 - box.y0) * height
+            limits = (float(f"{limit:.6g}") for limit in (*axes.get_xlim(), *axes.get_ylim()))
+            logarithmic = [scale == "log" for scale in (axes.get_xscale(), axes.get_yscale())]
+            labels = [" ".join(label.split()) for label in (axes.get_xlabel(), axes.get_ylabel())]
+            panels.append([*(round(float(corner), 1) for corner in corners), *limits, *logarithmic, *labels])
     chart.arrange(texts=True)
     ElementTree.register_namespace("", _SVG.strip("{}"))
     root = ElementTree.parse(io.BytesIO(image)).getroot()
@@ -69,28 +79,10 @@ def picture(chart: Chart, name: str, title: str) -> Picture:
         "aria-label": f"{title}. {chart.caption}".strip(". "),
         "stroke-linejoin": "round",
         "font-family": _FAMILY,
-        "data-axes": json.dumps(axes, separators=(",", ":")),
+        "data-axes": json.dumps(panels, separators=(",", ":")),
     }
     svg = ElementTree.tostring(root, encoding="unicode").replace("\n", "").replace(" />", "/>")
     return Picture(title, chart.caption, Markup(re.sub(r">\s+<", "><", svg)))
-
-
-def panel_axes(chart: Chart) -> Iterator[list[Any]]:
-    """Positions and axis limits of the panels, from which the script of the page shows the values under the pointer.
-
-    Yields:
-        For each visible panel with lines: left, top, right and bottom in the drawing [point]; limits of x and y;
-        True or False for logarithmic x and y; labels of x and y.
-    """
-    width, height = 72.0 * chart.get_size_inches()
-    for axes in chart.axes:
-        if axes.lines and axes.get_visible() and axes.get_xlabel():
-            box = axes.get_position()
-            corners = box.x0 * width, (1.0 - box.y1) * height, box.x1 * width, (1.0 - box.y0) * height
-            limits = (float(f"{limit:.6g}") for limit in (*axes.get_xlim(), *axes.get_ylim()))
-            logarithmic = [scale == "log" for scale in (axes.get_xscale(), axes.get_yscale())]
-            labels = [" ".join(label.split()) for label in (axes.get_xlabel(), axes.get_ylabel())]
-            yield [*(round(float(corner), 1) for corner in corners), *limits, *logarithmic, *labels]
 
 
 def _rewrite(root: ElementTree.Element, prefix: str) -> None:

@@ -52,12 +52,26 @@ def sweeps_figure(result: Result, table: pd.DataFrame, title: str) -> style.Char
     groups = [group.thinned() for group in sweep_groups(table, result)]
     figure = style.Chart(title, (style.ROW + _STRIP) * len(groups))
     grid = figure.add_gridspec(len(groups), 2)
-    for row, group in enumerate(groups):
-        columns = [grid[row, i].subgridspec(2, 1, height_ratios=[style.ROW, _STRIP], hspace=0.1) for i in (0, 1)]
+    for line, group in enumerate(groups):
+        columns = [grid[line, i].subgridspec(2, 1, height_ratios=[style.ROW, _STRIP], hspace=0.1) for i in (0, 1)]
         pair = [figure.add_subplot(column[0]) for column in columns]
         strips = [figure.add_subplot(column[1], sharex=panel) for column, panel in zip(columns, pair, strict=True)]
         draw_curves(pair, group, result)
-        _draw_residuals(strips, group)
+        looks, rows = style.styles(len(group.curves), group.palette), pd.concat([curve.rows for curve in group.curves])
+        x, outliers = rows[group.x_header].to_numpy(), rows[rows["outlier"] == "yes"]
+        for strip, part in zip(strips, ("stiffness", "loss"), strict=True):
+            header = f"{part} residual [noise]"
+            for curve, look in zip(group.curves, looks, strict=True):
+                points = points_to_draw(curve.rows)
+                points = points[:: stride(len(points), len(looks))]
+                strip.plot(
+                    points[group.x_header], points[header], look.marker, color=look.color, alpha=0.8, **style.DOT
+                )
+            style.label_axes(strip, group.x_header, f"{part} residual\n/ noise", x)
+            if group.axis == "amplitude" and x.max() > 3.0 * x.min():
+                style.make_logarithmic(strip, x)
+            style.noise_band(strip)
+            style.mark_outliers(strip, outliers[group.x_header].to_numpy(), outliers[header].to_numpy())
         for panel in pair:
             panel.set_xlabel("")
             panel.tick_params(labelbottom=False)
@@ -82,10 +96,11 @@ def draw_curves(panels: Sequence[Axes], group: SweepGroup, result: Result) -> No
     largest = float(np.abs(table_stiffness(rows, group.place)).max())
     pair = ResponsePair(panels, group.place, largest, group.x_header, rows[group.x_header].to_numpy())
     looks, length = style.styles(len(group.curves), group.palette), group.place.display.displacement.factor
+    shares_levels = group.palette in ("amplitude", "frequency")  # a colour bar can then name the curves
     for curve, look in zip(group.curves, looks, strict=True):
         drawn, x = points_to_draw(curve.rows), curve.rows[group.x_header].to_numpy()
         pair.draw_points(drawn[group.x_header].to_numpy(), table_stiffness(drawn, group.place), look, len(group.curves))
-        if not group.shares_levels or result.model.depends_on:  # conditions vary: the line joins the measured points
+        if not shares_levels or result.model.depends_on:  # conditions vary: the line joins the measured points
             modelled = pd.Series(table_stiffness(curve.rows, group.place, "model ")).groupby(x).mean()
             line = modelled.index.to_numpy(), modelled.to_numpy()
         else:
@@ -94,7 +109,7 @@ def draw_curves(panels: Sequence[Axes], group: SweepGroup, result: Result) -> No
             line = fine, result.model.stiffness(group.place, *np.broadcast_arrays(*axes))
         pair.plot(*line, color=look.color, ls=look.dashes, lw=1.3)
     names = [shorten(curve.name, 30) for curve in group.curves]
-    if group.shares_levels:
+    if shares_levels:
         style.name_levels(panels[-1], names, group.palette)
     else:
         style.legend(panels[-1], [look.handle(True) for look in looks], names, "test")
@@ -116,28 +131,6 @@ def points_note(table: pd.DataFrame) -> str:
     hidden = int((table["stated error [-]"] > _WORST_DRAWN).sum()) if "stated error [-]" in table else 0
     left_out = f" {hidden} points with a stated error above {100 * _WORST_DRAWN:g} % are not drawn." if hidden else ""
     return f"Points: {bars}.{left_out}"
-
-
-def _draw_residuals(strips: Sequence[Axes], group: SweepGroup) -> None:
-    """Draw the residuals of stiffness and loss of a group of sweeps, measured minus model, in units of noise.
-
-    Args:
-        strips: left and right panel, for stiffness and for loss.
-        group: sweeps of one direction or specimen.
-    """
-    looks, rows = style.styles(len(group.curves), group.palette), pd.concat([curve.rows for curve in group.curves])
-    x, outliers = rows[group.x_header].to_numpy(), rows[rows["outlier"] == "yes"]
-    for strip, part in zip(strips, ("stiffness", "loss"), strict=True):
-        header = f"{part} residual [noise]"
-        for curve, look in zip(group.curves, looks, strict=True):
-            points = points_to_draw(curve.rows)
-            points = points[:: stride(len(points), len(looks))]
-            strip.plot(points[group.x_header], points[header], look.marker, color=look.color, alpha=0.8, **style.DOT)
-        style.label_axes(strip, group.x_header, f"{part} residual\n/ noise", x)
-        if group.axis == "amplitude" and x.max() > 3.0 * x.min():
-            style.make_logarithmic(strip, x)
-        style.noise_band(strip)
-        style.mark_outliers(strip, outliers[group.x_header].to_numpy(), outliers[header].to_numpy())
 
 
 @style.fixed_settings()

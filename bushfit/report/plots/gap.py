@@ -75,10 +75,15 @@ def gap_figure(table: pd.DataFrame, result: Result, diagnosis: Mapping[str, Any]
         edges, colors = color_scale(sweeps, list(sides))
         for row, (group, rows) in enumerate(maps):
             panels = grid[row].subgridspec(2, len(sides), hspace=0.08, wspace=0.1).subplots(squeeze=False)
+            names = [shorten(curve.name, 24) for curve in rows]
+            ticks = np.arange(0, len(names), math.ceil(len(names) / 10))
             for of_part, part in zip(panels, ("storage", "loss"), strict=True):
                 for axes, side in zip(of_part, sides, strict=True):
                     draw_map(axes, group, rows, f"{part} {side} [%]", colors)
-                _label_maps(of_part, group, rows, part)
+                    axes.set_yticks(ticks, [names[tick] for tick in ticks])
+                    axes.tick_params(labelleft=axes is of_part[0], labelbottom=part == "loss")
+                    axes.set_xlabel(group.x_header if part == "loss" else "")
+                style.label_left(of_part[0], f"{group.place}\n{part}", **_ROW_NAME)
             first = first or list(panels[0])
         _draw_scale(figure.add_subplot(grid[len(maps)]), edges, colors)
     for row, (place, of_place) in enumerate(loops, start=len(heights) - len(loops)):
@@ -215,25 +220,6 @@ def cell_edges(values: Array, *, logarithmic: bool) -> tuple[Array, Array]:
     low = x - np.where(below > 1.75 * above, above, below) / 2.0
     high = x + np.where(above > 1.75 * below, below, above) / 2.0
     return (np.exp(low), np.exp(high)) if logarithmic else (np.maximum(low, 0.0), high)
-
-
-def _label_maps(panels: Sequence[Axes], group: SweepGroup, rows: Sequence[Curve], part: str) -> None:
-    """Label a row of maps: fixed amplitudes (or frequencies) at the left, and the stepped quantity below the maps.
-
-    Args:
-        panels: maps of the row.
-        group: sweeps of the maps.
-        rows: rows of each map, the smallest amplitude or frequency first.
-        part: "storage" or "loss".
-    """
-    names = [shorten(row.name, 24) for row in rows]
-    ticks = np.arange(0, len(names), math.ceil(len(names) / 10))
-    for axes in panels:
-        axes.set_yticks(ticks, [names[tick] for tick in ticks])
-        axes.tick_params(labelleft=axes is panels[0], labelbottom=part == "loss")
-        if part == "loss":
-            axes.set_xlabel(group.x_header)
-    style.label_left(panels[0], f"{group.place}\n{part}", **_ROW_NAME)
 
 
 def _draw_scale(axes: Axes, edges: Array, colors: ScalarMappable) -> None:

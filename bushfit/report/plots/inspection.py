@@ -132,9 +132,18 @@ def reduction_figure(reduction: Reduction, histories: Sequence[Loop], title: str
     steps = pd.DataFrame([vars(step) for step in reduction.steps]).sort_values("frequency", kind="stable")
     levels = np.unique(steps["level"])
     looks = dict(zip(levels, style.styles(len(levels), "amplitude"), strict=True))
+    unit, factor = reduction.direction.display.displacement
     for row, history in enumerate(drawn):
-        strip = figure.add_subplot(grid[row, :])
-        _draw_strip(strip, history, reduction, looks)
+        strip, rows = figure.add_subplot(grid[row, :]), extreme_rows(history.displacement, _MOST_OVER_TIME)
+        time, motion = history.time[rows], factor * history.displacement[rows]
+        strip.plot(time, motion, color="#c8c8c8", lw=0.4)
+        for level, look in looks.items():
+            used = np.zeros(time.shape, dtype=bool)
+            for step in (step for step in reduction.steps if (step.name, step.level) == (history.name, level)):
+                used |= (time >= step.start) & (time <= step.end)
+            strip.plot(time, np.where(used, motion, np.nan), color=look.color, lw=0.4)
+        style.label_axes(strip, "time [s]", f"{reduction.direction.motion.words[0]}\n[{unit}]")
+        strip.margins(x=0.01)
         if len(histories) > 1:  # the title of the figure names a single history
             name = shorten(history.name, 100)  # one line
             strip.set_title(name, fontsize=style.SMALL, loc="left", color=style.GREY, pad=2)
@@ -147,28 +156,6 @@ def reduction_figure(reduction: Reduction, histories: Sequence[Loop], title: str
         "Bars: twice the standard error. Noise: standard error of a point relative to |K|.",
         "Distortion: harmonics relative to the fundamental; filled symbols: force, open symbols: displacement.",
     )
-
-
-def _draw_strip(axes: Axes, history: Loop, reduction: Reduction, looks: dict[float, style.Style]) -> None:
-    """Draw displacement over time, with the cycles used for operating points in the colour of their amplitude.
-
-    Args:
-        axes: panel.
-        history: record to draw.
-        reduction: operating points of the histories, which state the cycles used.
-        looks: colour and marker by nominal amplitude [m, rad or 1].
-    """
-    unit, factor = reduction.direction.display.displacement
-    rows = extreme_rows(history.displacement, _MOST_OVER_TIME)
-    time, motion = history.time[rows], factor * history.displacement[rows]
-    axes.plot(time, motion, color="#c8c8c8", lw=0.4)
-    for level, look in looks.items():
-        used = np.zeros(time.shape, dtype=bool)
-        for step in (step for step in reduction.steps if (step.name, step.level) == (history.name, level)):
-            used |= (time >= step.start) & (time <= step.end)
-        axes.plot(time, np.where(used, motion, np.nan), color=look.color, lw=0.4)
-    style.label_axes(axes, "time [s]", f"{reduction.direction.motion.words[0]}\n[{unit}]")
-    axes.margins(x=0.01)
 
 
 def _draw_points(

@@ -60,11 +60,6 @@ class SweepGroup(NamedTuple):
     palette: str
     curves: Sequence[Curve]
 
-    @property
-    def shares_levels(self) -> bool:
-        """True if the curves differ only in a fixed amplitude or frequency, so that a colour bar can name them."""
-        return self.palette in ("amplitude", "frequency")
-
     def thinned(self) -> SweepGroup:
         """Copy of the group with at most 24 of its curves, evenly chosen from the first to the last."""
         return self._replace(curves=[self.curves[index] for index in spread_indices(len(self.curves), MOST_CURVES)])
