@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bushfit.batch import store
-from bushfit.batch.document import Estimate, RowFile
+from bushfit.batch.document import ROW_SCHEMA, Estimate, RowFile
 from bushfit.batch.manifest import Row, RowSettings
 from bushfit.batch.quantities import FIT_QUALITY, LOSS_FACTOR, STIFFNESS, Point, measured_at, measured_curve
 from bushfit.campaign.campaign import Campaign, load_campaign
@@ -68,7 +69,8 @@ class RowTask:
             problem, hint = "a worker runs another bushfit version", "install the same version on all workers"
             raise BatchError(problem, found=__version__, expected=self.version, hint=hint)
         limit_threads()
-        key = store.row_key(row, self.points, self.formats)
+        settings = asdict(row.settings), asdict(self.formats), [str(point) for point in self.points]
+        key = store.digest(json.dumps([__version__, ROW_SCHEMA, *settings], sort_keys=True).encode())
         if self.resume and (earlier := store.load_row(self.output, row, key)):
             return earlier, True
         start, files = time.perf_counter(), dict[str, bytes]()

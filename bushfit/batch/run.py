@@ -71,6 +71,8 @@ def run_batch(plan: BatchPlan, workers: Workers, before_writing: Callable[[Batch
         BatchError: the workers are lost; finished rows are kept.
         OutputError: the results cannot be written, or another batch is running in the folder.
     """
+    from bushfit.report.page.index import index_page
+
     output, start = plan.task.output, time.perf_counter()
     try:
         with store.batch_folder(output):
@@ -86,11 +88,18 @@ def run_batch(plan: BatchPlan, workers: Workers, before_writing: Callable[[Batch
                 counts[record.status] += 1
                 counts["kept"] += was_kept
             result = BatchResult(plan, records, counts["kept"], time.perf_counter() - start, notes)
-            files = encode_all(batch_files(result), plan.formats)
+            table = ResultFile("batch", "table", result.table)
+            files = [ResultFile("batch", "json", to_json_data(result.document, BatchFile)), table]
+            if plan.formats.pages:
+                files.append(ResultFile("index", "page", partial(index_page, result.document, output)))
+            if plan.formats.pictures and plots.batch.quantities_to_draw(result.document, table.content()):
+                draw = lambda: plots.batch.batch_figure(result.document, table.content())  # noqa: E731
+                files.append(ResultFile("batch", "figure", draw))
+            encoded = encode_all(files, plan.formats)
             before_writing(result)
             if plan.junit:
                 write_files(plan.junit.parent, {plan.junit.name: junit_report(result)})
-            write_files(output, files)
+            write_files(output, encoded)
             return result
     except OSError as error:
         raise unwritable(output, error) from error
@@ -111,21 +120,3 @@ def remove_unlisted_parts(plan: BatchPlan) -> list[Caveat]:
         shutil.rmtree(folder)
     sentence = f"results of {len(folders)} {several} not in this batch {outcome}"
     return [Caveat("earlier_results", sentence)] if folders else []
-
-
-def batch_files(result: BatchResult) -> list[ResultFile]:
-    """Collect the result files of the whole batch, not yet written.
-
-    Returns:
-        Document, table, and page and figure if the formats include them.
-    """
-    from bushfit.report.page.index import index_page
-
-    formats, document = result.plan.formats, result.document
-    table = ResultFile("batch", "table", result.table)
-    files = [ResultFile("batch", "json", to_json_data(document, BatchFile)), table]
-    if formats.pages:
-        files.append(ResultFile("index", "page", partial(index_page, document, result.plan.task.output)))
-    if formats.pictures and plots.batch.quantities_to_draw(document, table.content()):
-        files.append(ResultFile("batch", "figure", lambda: plots.batch.batch_figure(document, table.content())))
-    return files

@@ -9,38 +9,19 @@ import contextlib
 import hashlib
 import json
 import os
-from collections.abc import Collection, Iterator, Mapping
-from dataclasses import asdict
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from bushfit.batch.document import ROW_SCHEMA, RowFile
+from bushfit.batch.document import RowFile
 from bushfit.batch.manifest import Row
-from bushfit.batch.quantities import Point
 from bushfit.errors import BushfitError, OutputError
 from bushfit.reading.files import view_bytes
-from bushfit.report.results import Formats
 from bushfit.validation import to_json_data, validate_tables
-from bushfit.version import __version__
 
 #: Name of the record in the folder of a row.
 ROW_FILE = "row.json"
 #: Name of the folder in the batch folder that contains the folders of the rows.
 ROWS_FOLDER = "bushings"
-
-
-def row_key(row: Row, points: Collection[Point], formats: Formats) -> str:
-    """Hash of everything except the input files that the results of a part depend on: settings and version of bushfit.
-
-    Args:
-        row: row of the batch (one part) with its settings.
-        points: operating points of stiffness and loss factor.
-        formats: formats of the files that the row writes.
-
-    Returns:
-        SHA-256 in hexadecimal digits.
-    """
-    settings = [asdict(row.settings), asdict(formats), [str(point) for point in points]]
-    return digest(json.dumps([__version__, ROW_SCHEMA, *settings], sort_keys=True).encode())
 
 
 def load_row(output: Path, row: Row, key: str) -> RowFile | None:
@@ -49,7 +30,7 @@ def load_row(output: Path, row: Row, key: str) -> RowFile | None:
     Args:
         output: results folder of the batch.
         row: row of the batch (one part).
-        key: hash of the row's settings, from `row_key`.
+        key: hash of everything except the input files that the results depend on.
 
     Returns:
         The results; None if settings or inputs have changed, or a file is damaged or missing.
