@@ -12,7 +12,6 @@ Abaqus Analysis User's Guide, "Frequency domain viscoelasticity" and "Time domai
 """
 
 from collections.abc import Iterator, Sequence
-from functools import partial
 
 import numpy as np
 
@@ -22,14 +21,15 @@ from bushfit.export.contract import MM_T_S_N, Exported, ExportRequest, UnitSyste
 from bushfit.export.deck import (
     AmplitudeLevel,
     StiffnessForm,
+    amplitude_levels,
     by_dof,
     comment_lines,
     describe_amplitudes,
     exported_directions,
     format_real,
+    heading,
     stiffness_tables,
     table_omissions,
-    write_deck,
 )
 from bushfit.export.prony import COMPOUND, LONG_TERM, PronySeries, prony_omissions, prony_series
 from bushfit.units import number
@@ -58,9 +58,12 @@ def export(request: ExportRequest) -> Exported:
         sentence = "compound: no elastic branch, so no long-term modulus, and no material"
     usage = "behaviors are for CONN3D2 of type BUSHING; they act in *STEADY STATE DYNAMICS, DIRECT"
     omissions += (Caveat("format_omission", sentence), *(prony_omissions(series) if series else ()))
-    materials = _materials(request, units, series) if has_material else ()
-    deck = write_deck(request, "**", units, omissions, usage, "BUSHING_", partial(_behavior, units), materials)
-    return Exported({"bushing.inp": deck}, omissions)
+    lines = comment_lines("**", [*heading(request, units, omissions), usage])
+    for rank, level in amplitude_levels(request):
+        lines += comment_lines("**", [f"BUSHING_{rank}: {describe_amplitudes(level)}"])
+        lines += _behavior(units, rank, level)
+    lines += _materials(request, units, series) if has_material else ()
+    return Exported({"bushing.inp": "".join(f"{line}\n" for line in lines).encode("ascii")}, omissions)
 
 
 def _behavior(units: UnitSystem, rank: int, level: AmplitudeLevel) -> Iterator[str]:

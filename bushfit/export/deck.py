@@ -139,12 +139,12 @@ def comment_lines(mark: str, lines: Iterable[str]) -> list[str]:
     return wrapped
 
 
-def heading(request: ExportRequest, units: str, omissions: Iterable[Caveat]) -> list[str]:
+def heading(request: ExportRequest, units: str | UnitSystem, omissions: Iterable[Caveat]) -> list[str]:
     """List the comments at the head of a deck: bushing, model and its hash, units, axes, omissions and warnings.
 
     Args:
         request: model and settings.
-        units: description of the units.
+        units: description of the units, or unit system of a deck whose rotations are in rad.
         omissions: properties that the deck cannot represent.
 
     Returns:
@@ -153,6 +153,8 @@ def heading(request: ExportRequest, units: str, omissions: Iterable[Caveat]) -> 
     place = exported_directions(request)[0].direction
     bushing, source = bushing_at(request.result.model.bushing, place), request.source
     sizes = (bushing.inner_radius, bushing.outer_radius, bushing.length) if bushing else ()
+    if isinstance(units, UnitSystem):
+        units = f"{units}; frequency in {units.frequency.name}, rotation in rad"
     return [
         f"written by bushfit {__version__}{f' on {request.day}' if request.day else ''}",
         f"bushing: {request.result.name}",
@@ -165,45 +167,22 @@ def heading(request: ExportRequest, units: str, omissions: Iterable[Caveat]) -> 
     ]
 
 
-def write_deck(
-    request: ExportRequest,
-    mark: str,
-    units: UnitSystem,
-    omissions: Iterable[Caveat],
-    usage: str,
-    name: str,
-    level_lines: Callable[[int, AmplitudeLevel], Iterable[str]],
-    last_lines: Iterable[str] = (),
-) -> bytes:
-    """Write a deck: its heading, then a comment and the lines of each amplitude level.
+def amplitude_levels(request: ExportRequest) -> Iterator[tuple[int, AmplitudeLevel]]:
+    """Stack the stiffness tables of all directions by amplitude, the smallest amplitudes first.
 
-    A level has the stiffness tables of one amplitude of each direction, the smallest amplitudes first. A direction with
-    fewer amplitudes than others repeats its largest.
+    A direction with fewer amplitudes than others repeats its largest.
 
-    Args:
-        request: model and settings.
-        mark: comment sign at the start of a comment line.
-        units: unit system of the deck.
-        omissions: properties that the deck cannot represent.
-        usage: comment on the use of the deck in the solver.
-        name: prefix of the names of the levels, before their rank.
-        level_lines: function of the rank of a level, from 1, and the level that returns its lines.
-        last_lines: lines below those of all levels.
-
-    Returns:
-        Content of the deck, in ASCII.
+    Yields:
+        Rank, from 1, and the tables of one amplitude of each direction, with the stated constant of the rotations about
+        x and y, if there is one.
     """
-    about = f"{units}; frequency in {units.frequency.name}, rotation in rad"
-    lines = comment_lines(mark, [*heading(request, about, omissions), usage])
     by_direction = [stiffness_tables(prediction) for prediction in exported_directions(request)]
     stated: AmplitudeLevel = ()
     if request.cardanic is not None:
         frequency = by_direction[0][0].frequency
         stated = (StiffnessTable(Direction.TORSION, 0.0, frequency, np.full(frequency.size, request.cardanic)),)
     for rank in range(1, max(map(len, by_direction)) + 1):
-        level = *(tables[min(rank, len(tables)) - 1] for tables in by_direction), *stated
-        lines += [*comment_lines(mark, [f"{name}{rank}: {describe_amplitudes(level)}"]), *level_lines(rank, level)]
-    return "".join(f"{line}\n" for line in (*lines, *last_lines)).encode("ascii")
+        yield rank, (*(tables[min(rank, len(tables)) - 1] for tables in by_direction), *stated)
 
 
 def describe_amplitudes(level: Iterable[StiffnessTable]) -> str:

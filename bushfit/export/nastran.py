@@ -8,7 +8,6 @@ Source: Autodesk Nastran 2025 reference, PBUSHT; Altair OptiStruct 2021 referenc
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from functools import partial
 
 import numpy as np
 
@@ -16,10 +15,13 @@ from bushfit.export.contract import MM_T_S_N, Exported, ExportRequest, UnitSyste
 from bushfit.export.deck import (
     AmplitudeLevel,
     StiffnessForm,
+    amplitude_levels,
     by_dof,
+    comment_lines,
+    describe_amplitudes,
     format_real,
+    heading,
     table_omissions,
-    write_deck,
 )
 
 #: Difference between the table numbers of two properties. The last two digits are the degree of freedom n for K, and
@@ -57,8 +59,11 @@ def export(request: ExportRequest) -> Exported:
         "the tables act in frequency response; PBUSH alone, at the lowest frequency, acts elsewhere; PARAM,G is added "
         "to the loss"
     )
-    deck = write_deck(request, "$", units, omissions, usage, "property ", partial(_property, names, form, units))
-    return Exported({file: deck}, omissions)
+    lines = comment_lines("$", [*heading(request, units, omissions), usage])
+    for rank, level in amplitude_levels(request):
+        lines += comment_lines("$", [f"property {rank}: {describe_amplitudes(level)}"])
+        lines += _property(names, form, units, rank, level)
+    return Exported({file: "".join(f"{line}\n" for line in lines).encode("ascii")}, omissions)
 
 
 def _property(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -92,41 +93,10 @@ class PlaceDifferences:
         """Headers of the relative difference of the stiffness or modulus, and of the difference of the loss factor."""
         return f"relative difference of {split_header(self.stiffness)[0]} [-]", f"difference of {LOSS}"
 
-    @classmethod
-    def from_columns(cls, label: str, place: str, columns: Mapping[str, Sequence[Any]]) -> PlaceDifferences:
-        """Make the differences from columns of compare.json; the quantity may be a stiffness or a modulus, in any unit.
-
-        Args:
-            label: letter of the result.
-            place: name of the direction or specimen.
-            columns: columns of the table by header, in the order of `contrast_headers`.
-
-        Returns:
-            The differences, with their table and its headers.
-
-        Raises:
-            ModelError: a column is missing or empty, or columns have different lengths.
-        """
-        _, amplitude, stiffness, *_ = [*columns, *contrast_headers("", "")]
-        stiffness = stiffness.removeprefix("reference ")
-        if [*columns] != contrast_headers(amplitude, stiffness) or len({0, *map(len, columns.values())}) != 2:
-            raise ModelError(
-                "columns are missing, empty or of unequal length",
-                place=f"pairs, {label}, places, {place}",
-                expected="the columns that bushfit compare writes, equally long",
-            )
-        types = {header: float for header in columns if not header.endswith(", significant")}
-        table = pd.DataFrame({"other": label, "direction": place, **columns}).astype(types)
-        return cls(label, place, table, amplitude, stiffness)
-
     def band(self, header: str) -> Array:
         """Value, low and high end of the 95 % band of the column `header`, (3, n), in the unit of the header."""
         ends = [f"{header}{end}" for end in ("", ", low", ", high")]
         return self.table[ends].to_numpy(dtype=float).T
-
-    def grid(self) -> Array:
-        """Frequency [Hz] and amplitude (unit of its header) of the operating points, (2, n)."""
-        return self.table[["frequency [Hz]", self.amplitude]].to_numpy(dtype=float).T
 
 
 def read_comparison(document: Mapping[str, Any], file: Path | None = None) -> ComparisonFile:
@@ -156,13 +126,29 @@ def read_comparison(document: Mapping[str, Any], file: Path | None = None) -> Co
 
 
 def place_differences(comparison: ComparisonFile) -> dict[str, list[PlaceDifferences]]:
-    """Differences in stiffness and loss factor from the reference: one per other result, by direction or specimen.
+    """Differences in stiffness and loss factor from the reference; the quantity may be a stiffness or a modulus.
+
+    Returns:
+        Differences of each other result, by direction or specimen.
 
     Raises:
-        ModelError: columns of a pair that do not go together.
+        ModelError: a column of a pair is missing or empty, or columns have different lengths.
     """
-    pairs, columns = comparison.pairs, PlaceDifferences.from_columns
-    return {place: [columns(pair.other, place, pair.places[place]) for pair in pairs] for place in pairs[0].places}
+    by_place = defaultdict[str, list[PlaceDifferences]](list)
+    for label, places in [(pair.other, pair.places) for pair in comparison.pairs]:
+        for place, columns in places.items():
+            _, amplitude, stiffness, *_ = [*columns, *contrast_headers("", "")]
+            stiffness = stiffness.removeprefix("reference ")
+            if [*columns] != contrast_headers(amplitude, stiffness) or len({0, *map(len, columns.values())}) != 2:
+                raise ModelError(
+                    "columns are missing, empty or of unequal length",
+                    place=f"pairs, {label}, places, {place}",
+                    expected="the columns that bushfit compare writes, equally long",
+                )
+            types = {header: float for header in columns if not header.endswith(", significant")}
+            table = pd.DataFrame({"other": label, "direction": place, **columns}).astype(types)
+            by_place[place].append(PlaceDifferences(label, place, table, amplitude, stiffness))
+    return by_place
 
 
 def parameter_differences_table(comparison: ComparisonFile) -> pd.DataFrame:

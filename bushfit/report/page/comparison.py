@@ -114,7 +114,7 @@ def value_rows(differences: Mapping[str, Sequence[PlaceDifferences]]) -> Iterato
         (_, length), (_, unit) = split_header(one.amplitude), split_header(one.stiffness)
         relative, loss = one.changes
         kinds = (one.stiffness, relative, f" {unit}", 100.0, " %"), (LOSS, loss, "", 1.0, "")
-        frequency, amplitude = one.grid()
+        frequency, amplitude = (one.table[header].to_numpy() for header in ("frequency [Hz]", one.amplitude))
         for index in spread_points(amplitude, frequency, amplitudes, min(point_limit // amplitudes, _FREQUENCIES)):
             row, cells = one.table.iloc[index], []
             for quantity, difference, suffix, scale, percent in kinds:

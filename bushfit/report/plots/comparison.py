@@ -35,10 +35,9 @@ def comparison_figure(comparison: ComparisonFile) -> style.Chart:
     looks = dict(zip(comparison.names, style.styles(len(comparison.names), "loop"), strict=True))
     for row, (place, differences) in enumerate(by_place.items()):
         reference = differences[0]
-        over_frequency = bool(np.ptp(reference.grid()[0]))
-        step = 1 if over_frequency else -1  # frequency along x and fixed amplitudes, or the other way round
-        x_header, fixed_header = ("frequency [Hz]", reference.amplitude)[::step]
-        levels = np.unique(np.unique(reference.grid()[::step][1])[[0, -1]])
+        over_frequency = np.ptp(reference.table["frequency [Hz]"]) > 0.0  # at fixed amplitudes, or the other way round
+        x_header, fixed_header = ("frequency [Hz]", reference.amplitude)[:: 1 if over_frequency else -1]
+        levels = np.unique(np.unique(reference.table[fixed_header])[[0, -1]])
         values = [(first, reference, "reference "), *((one.label, one, "other ") for one in differences)]
         changes = [(one.label, one, "") for one in differences]
         name, unit = split_header(reference.stiffness)
@@ -53,14 +52,15 @@ def comparison_figure(comparison: ComparisonFile) -> style.Chart:
         of_place = grid[2 * row : 2 * row + 2].flat
         for axes, (header, y_label, scale, sides, least_span) in zip(of_place, panels, strict=True):
             for label, one, side in sides:
-                (x, level), band, look = one.grid()[::step], scale * one.band(side + header), looks[label]
+                x, level = (one.table[name].to_numpy() for name in (x_header, fixed_header))
+                band, look = scale * one.band(side + header), looks[label]
                 for drawn_level, dashes in zip(levels, style.DASHES, strict=False):
                     drawn_x, (value, low, high) = x[level == drawn_level], band[:, level == drawn_level]
                     line = axes.plot(drawn_x, value, color=look.color, ls=dashes, lw=_STROKE)[0]
                     line.set(marker=look.marker, markevery=max(value.size // _MARKS, 1), **style.POINT)
                     # transparent: bands of several results overlap
                     axes.fill_between(drawn_x, low, high, color=look.color, alpha=0.18, lw=0)
-            style.label_axes(axes, x_header, y_label, reference.grid()[::step][0])
+            style.label_axes(axes, x_header, y_label, reference.table[x_header].to_numpy())
             if least_span:
                 axes.axhline(0.0, color=looks[first].color, lw=_STROKE)
                 style.widen_span(axes, least_span)

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.gridspec import SubplotSpec
+from matplotlib.gridspec import GridSpec, SubplotSpec
 
 from bushfit.geometry import TRANSLATION
 from bushfit.inspection.record import Inspection
@@ -129,8 +129,7 @@ def reduction_figure(reduction: Reduction, histories: Sequence[Loop], title: str
     heights = [_STRIP] * len(drawn) + [style.ROW, _NOISE_ROW]
     figure = style.Chart(title, sum(heights))
     grid = figure.add_gridspec(len(heights), 2, height_ratios=heights)
-    steps = pd.DataFrame([vars(step) for step in reduction.steps]).sort_values("frequency", kind="stable")
-    levels = np.unique(steps["level"])
+    levels = np.unique([step.level for step in reduction.steps])
     looks = dict(zip(levels, style.styles(len(levels), "amplitude"), strict=True))
     unit, factor = reduction.direction.display.displacement
     for row, history in enumerate(drawn):
@@ -147,9 +146,7 @@ def reduction_figure(reduction: Reduction, histories: Sequence[Loop], title: str
         if len(histories) > 1:  # the title of the figure names a single history
             name = shorten(history.name, 100)  # one line
             strip.set_title(name, fontsize=style.SMALL, loc="left", color=style.GREY, pad=2)
-    points = [figure.add_subplot(grid[-2, column]) for column in range(2)]
-    quality = [figure.add_subplot(grid[-1, column], sharex=points[0]) for column in range(2)]
-    _draw_points(points, quality, reduction, steps, looks)
+    _draw_points(figure, grid, reduction, looks)
     left_out = f" The first {len(drawn)} of {len(histories)} histories." * (len(histories) > len(drawn))
     return figure.explain(
         f"Top: displacement over time; coloured: steady cycles used, grey: ramps, pauses, transients.{left_out}",
@@ -158,24 +155,19 @@ def reduction_figure(reduction: Reduction, histories: Sequence[Loop], title: str
     )
 
 
-def _draw_points(
-    panels: Sequence[Axes],
-    quality: Sequence[Axes],
-    reduction: Reduction,
-    steps: pd.DataFrame,
-    looks: dict[float, style.Style],
-) -> None:
+def _draw_points(figure: Figure, grid: GridSpec, reduction: Reduction, looks: dict[float, style.Style]) -> None:
     """Draw stiffness and loss factor of a reduction with bars of two standard errors, and below noise and distortion.
 
     Args:
-        panels: panels of stiffness and of loss factor.
-        quality: panels of standard errors and of harmonic distortion.
+        figure: figure to draw in.
+        grid: grid of the figure, whose last two rows have the panels.
         reduction: operating points of the histories.
-        steps: a row per operating point, with the attributes of `Step` as columns, such as "frequency" [Hz].
         looks: colour and marker by nominal amplitude [m, rad or 1].
     """
     unit, length = reduction.direction.display.displacement
-    x = steps["frequency"].to_numpy()
+    steps = pd.DataFrame([vars(step) for step in reduction.steps]).sort_values("frequency", kind="stable")
+    x, panels = steps["frequency"].to_numpy(), [figure.add_subplot(grid[-2, column]) for column in (0, 1)]
+    quality = [figure.add_subplot(grid[-1, column], sharex=panels[0]) for column in (0, 1)]
     pair = ResponsePair(panels, reduction.direction, float(steps["stiffness"].abs().max()), "", x)
     for level, look in looks.items():
         rows = steps[steps["level"] == level]
