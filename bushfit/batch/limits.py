@@ -258,16 +258,15 @@ def judge_part(
         the limits that it passes conditionally or that were not judged.
     """
     poor, outcomes = describe_poor_fit(record, limits), dict[str, tuple[LimitResult, str]]()
+    unlimited = -math.inf, math.inf
     for name in dict.fromkeys((*allowed, *record.at_bound)):
-        low, high = allowed.get(name, (-math.inf, math.inf))
         bound, source = record.at_bound.get(name), ""
         estimate = record.quantities.get(name)
         if estimate and poor and name not in FIT_NAMES:
             estimate, bound, source = record.measured.get(name), None, "measured "
         if estimate:
-            best: LimitResult = "conditional pass" if bound else "pass"
-            result = max(judge_value(estimate, low, high), best, key=RESULTS.index)
-            outcomes[name] = result, source + limit_sentence(quantities[name], estimate, (low, high), result, bound)
+            result, sentence = judge_quantity(quantities[name], estimate, allowed.get(name, unlimited), bound)
+            outcomes[name] = result, source + sentence
         elif source:
             outcomes[name] = "not judged", f"{name} not judged: poor fit"
         else:
@@ -282,37 +281,26 @@ def judge_part(
     return worst, misses, doubtful
 
 
-def judge_value(estimate: Estimate, low: float, high: float) -> LimitResult:
+def judge_quantity(
+    quantity: PartQuantity, estimate: Estimate, allowed: tuple[float, float], bound: str | None
+) -> tuple[LimitResult, str]:
     """Compare a value and its 95 % interval, if known, with limits.
-
-    Args:
-        estimate: value with its 95 % interval.
-        low, high: lowest and highest allowed value in the unit of the estimate; either may be infinite.
-
-    Returns:
-        "pass", "conditional pass", "conditional fail" or "fail".
-    """
-    lower, upper = (estimate.value if end is None else end for end in (estimate.low, estimate.high))
-    if low <= estimate.value <= high:
-        return "pass" if low <= lower and upper <= high else "conditional pass"
-    return "fail" if upper < low or lower > high else "conditional fail"
-
-
-def limit_sentence(
-    quantity: PartQuantity, estimate: Estimate, allowed: tuple[float, float], result: LimitResult, bound: str | None
-) -> str:
-    """Format a value, its interval and the nearer limit: "alpha 0.26 (0.25 to 0.27), limit 0.252: conditional fail".
 
     Args:
         quantity: name and unit of the quantity.
         estimate: value and interval of the quantity [SI].
-        allowed: lowest and highest allowed value [SI].
-        result: result of the comparison with the limits.
+        allowed: lowest and highest allowed value [SI]; either may be infinite.
         bound: bound of the fit, "min" or "max", that the parameter reached; None if it reached neither.
 
     Returns:
-        The sentence, in the display unit of the value.
+        Result, which is a conditional pass at best if the parameter reached a bound; and a sentence in the display unit
+        of the value, with the nearer limit: "alpha 0.26 (0.25 to 0.27), limit 0.252: conditional fail".
     """
+    low, high = allowed
+    lower, upper = (estimate.value if end is None else end for end in (estimate.low, estimate.high))
+    result: LimitResult = "fail" if upper < low or lower > high else "conditional fail"
+    if low <= estimate.value <= high:
+        result = "pass" if low <= lower and upper <= high and not bound else "conditional pass"
     displayed = quantity.in_display_unit(estimate.value)
     ends = [number(end * displayed.factor, 4) for end in (estimate.low, estimate.high) if end is not None]
     finite = [limit for limit in allowed if math.isfinite(limit)]
@@ -323,4 +311,4 @@ def limit_sentence(
         nearest = min(finite, key=lambda limit: abs(limit - estimate.value))
         sentence += f", limit {number(nearest * displayed.factor, 4)}{unit}"
     sentence += f", not determined ({bound} bound of the fit)" if bound else ""
-    return sentence + (f": {result}" if result.startswith("conditional") else "")
+    return result, sentence + (f": {result}" if result.startswith("conditional") else "")

@@ -19,7 +19,6 @@ from bushfit.caveat import Caveat
 from bushfit.effects import Level as EffectLevel
 from bushfit.export.contract import MM_T_S_N, Exported, ExportRequest, UnitSystem
 from bushfit.export.deck import (
-    AmplitudeLevel,
     StiffnessForm,
     amplitude_levels,
     by_dof,
@@ -61,31 +60,20 @@ def export(request: ExportRequest) -> Exported:
     lines = comment_lines("**", [*heading(request, units, omissions), usage])
     for rank, level in amplitude_levels(request):
         lines += comment_lines("**", [f"BUSHING_{rank}: {describe_amplitudes(level)}"])
-        lines += _behavior(units, rank, level)
+        lines.append(f"*CONNECTOR BEHAVIOR, NAME=BUSHING_{rank}")
+        frequency = level[0].frequency * units.frequency.factor
+        diagonals = np.zeros((2, 6, frequency.size))
+        for dof, table in by_dof(level):
+            diagonals[:, dof - 1] = _FORM.in_units(table, units)[1:]
+        for keyword, diagonal in zip(("ELASTICITY", "DAMPING"), diagonals, strict=True):
+            lines.append(f"*CONNECTOR {keyword}, FREQUENCY DEPENDENCE=ON")
+            for f, values in zip(frequency, diagonal.T, strict=True):
+                triangle = np.diag(values).T[np.tril_indices(6)]  # upper triangle of the matrix, column by column
+                texts = [*(format_real(value) for value in triangle), format_real(f, 10)]
+                starts = range(0, _CONSTANTS + 1, _A_LINE)
+                lines += [", ".join(texts[start : start + _A_LINE]) for start in starts]
     lines += _materials(request, units, series) if has_material else ()
     return Exported({"bushing.inp": "".join(f"{line}\n" for line in lines).encode("ascii")}, omissions)
-
-
-def _behavior(units: UnitSystem, rank: int, level: AmplitudeLevel) -> Iterator[str]:
-    """Yield the lines of the connector behavior (elasticity and damping) of one amplitude.
-
-    Args:
-        units: unit system of the deck.
-        rank: number of the amplitude level, from 1.
-        level: stiffness of all directions at this amplitude.
-    """
-    yield f"*CONNECTOR BEHAVIOR, NAME=BUSHING_{rank}"
-    frequency = level[0].frequency * units.frequency.factor
-    diagonals = np.zeros((2, 6, frequency.size))
-    for dof, table in by_dof(level):
-        diagonals[:, dof - 1] = _FORM.in_units(table, units)[1:]
-    for keyword, diagonal in zip(("ELASTICITY", "DAMPING"), diagonals, strict=True):
-        yield f"*CONNECTOR {keyword}, FREQUENCY DEPENDENCE=ON"
-        for f, values in zip(frequency, diagonal.T, strict=True):
-            triangle = np.diag(values).T[np.tril_indices(6)]  # upper triangle of the matrix, column by column
-            texts = [*(format_real(value) for value in triangle), format_real(f, 10)]
-            for start in range(0, _CONSTANTS + 1, _A_LINE):
-                yield ", ".join(texts[start : start + _A_LINE])
 
 
 def _materials(request: ExportRequest, units: UnitSystem, series: Sequence[PronySeries]) -> Iterator[str]:

@@ -7,13 +7,12 @@ GE = tan(ANGLE), the angle in deg.
 Source: Autodesk Nastran 2025 reference, PBUSHT; Altair OptiStruct 2021 reference, PBUSH (example 3) and PBUSHT.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from bushfit.export.contract import MM_T_S_N, Exported, ExportRequest, UnitSystem
+from bushfit.export.contract import MM_T_S_N, Exported, ExportRequest
 from bushfit.export.deck import (
-    AmplitudeLevel,
     StiffnessForm,
     amplitude_levels,
     by_dof,
@@ -45,7 +44,10 @@ _DIALECTS = {
 
 
 def export(request: ExportRequest) -> Exported:
-    """Write one bushing property (PBUSH with its tables) per amplitude as bulk data of Nastran or OptiStruct.
+    """Write one bushing property per amplitude as bulk data of Nastran or OptiStruct.
+
+    PBUSH has the values at the lowest frequency. For several frequencies PBUSHT refers to the tables: a card TABLED1
+    for each degree of freedom and keyword ("K" and "GE", in OptiStruct "KMAG" and "ANGLE").
 
     Args:
         request: model, predictions and settings.
@@ -62,42 +64,20 @@ def export(request: ExportRequest) -> Exported:
     lines = comment_lines("$", [*heading(request, units, omissions), usage])
     for rank, level in amplitude_levels(request):
         lines += comment_lines("$", [f"property {rank}: {describe_amplitudes(level)}"])
-        lines += _property(names, form, units, rank, level)
+        columns = {dof: form.in_units(table, units) for dof, table in by_dof(level)}
+        numbers = {(dof, part): str(_TABLES * rank + 10 * part + dof) for dof in columns for part in (0, 1)}
+        nominal = {(dof, part): format_real(columns[dof][1 + part][0]) for dof, part in numbers}
+
+        cards = {"PBUSH*": nominal, "PBUSHT": numbers} if level[0].frequency.size > 1 else {"PBUSH*": nominal}
+        for card, entries in cards.items():
+            rows = [[name, *(entries.get((dof, part), "") for dof in range(1, 7))] for part, name in enumerate(names)]
+            lines += _card(card, [str(rank), *rows[0], "", *rows[1]])
+        if "PBUSHT" in cards:
+            for (dof, part), table_number in numbers.items():
+                points = zip(columns[dof][0], columns[dof][1 + part], strict=True)
+                pairs = [text for f, value in points for text in (format_real(f, 10), format_real(value))]
+                lines += _card("TABLED1*", [table_number, "LINEAR", "LINEAR", *5 * [""], *pairs, "ENDT"])
     return Exported({file: "".join(f"{line}\n" for line in lines).encode("ascii")}, omissions)
-
-
-def _property(
-    names: Sequence[str], form: StiffnessForm, units: UnitSystem, pid: int, level: AmplitudeLevel
-) -> Iterator[str]:
-    """Yield the bulk data lines of the bushing property (card PBUSH) at one amplitude, with its frequency tables.
-
-    Args:
-        names: keywords of stiffness and damping in the cards: "K" and "GE", in OptiStruct "KMAG" and "ANGLE".
-        form: conversion of the complex stiffness to the quantities of these keywords.
-        units: unit system of the deck.
-        pid: number of the property.
-        level: stiffness tables of all directions at this amplitude.
-
-    Yields:
-        PBUSH with the values at the lowest frequency; for several frequencies also PBUSHT, which refers to the tables,
-        and a card TABLED1 for each degree of freedom and keyword.
-    """
-    columns = {dof: form.in_units(table, units) for dof, table in by_dof(level)}
-    numbers = {(dof, part): str(_TABLES * pid + 10 * part + dof) for dof in columns for part in (0, 1)}
-    nominal = {(dof, part): format_real(columns[dof][1 + part][0]) for dof, part in numbers}
-
-    def fields(entries: Mapping[tuple[int, int], str]) -> list[str]:
-        """Fields of a card: property number, then each keyword and its `entries` (key: degree of freedom, 0 or 1)."""
-        rows = [[name, *(entries.get((dof, part), "") for dof in range(1, 7))] for part, name in enumerate(names)]
-        return [str(pid), *rows[0], "", *rows[1]]
-
-    yield from _card("PBUSH*", fields(nominal))
-    if level[0].frequency.size > 1:
-        yield from _card("PBUSHT", fields(numbers))
-        for (dof, part), table_number in numbers.items():
-            points = zip(columns[dof][0], columns[dof][1 + part], strict=True)
-            pairs = [text for f, value in points for text in (format_real(f, 10), format_real(value))]
-            yield from _card("TABLED1*", [table_number, "LINEAR", "LINEAR", *5 * [""], *pairs, "ENDT"])
 
 
 def _card(name: str, fields: Sequence[str]) -> Iterator[str]:

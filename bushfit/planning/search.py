@@ -112,10 +112,29 @@ class PlanSearch:
         counts = best_runs(replace(self, penalty=_PENALTY), required, required)
         if self.less_visible_effects(counts):
             standard = np.minimum(self.standard_counts, self.budget.maximum_runs)
-            starts = [counts, *([] if required.any() else [standard])]
-            choices = (best_runs(self, start, required) for start in starts)
+            starts = [counts] if required.any() else [counts, standard]
+            counts = min((best_runs(self, start, required) for start in starts), key=self.objective)
+        # a repeat of one test in each direction with more than two tests shows drift and noise
+        for place in np.unique(self.budget.place[counts > 0]):
+            chosen = np.flatnonzero((counts > 0) & (self.budget.place == place))
+            if chosen.size > 2 and counts[chosen].max() < 2:
+                quickest = chosen[np.argsort(self.budget.minutes[chosen])][:4]
+                counts = min(self.with_one_repeat(counts, quickest), key=self.objective, default=counts)
+        # repeats of sweeps determine the random noise of points, apart from differences of runs; without targets, the
+        # errors grow by at most 5 %, which is 0.1 in the logarithm of the variance
+        largest = np.inf if self.goals else self.objective(counts) + 0.1
+        while not self.determines_noise(counts):
+            freedom = self.noise_freedom(counts)
+            sweeps = [test for test in np.flatnonzero(counts).tolist() if freedom_per_repeat(self.tests[test])]
+            choices = [
+                runs
+                for runs in self.with_one_repeat(counts, sweeps)
+                if self.noise_freedom(runs) > freedom and self.objective(runs) <= largest
+            ]
+            if not choices:
+                break
             counts = min(choices, key=self.objective)
-        return self.with_noise_repeats(self.with_repeats(counts))
+        return counts
 
     @cached_property
     def runs(self) -> list[int]:
@@ -247,46 +266,6 @@ class PlanSearch:
         reached = self.models[0].total(counts).noncentralities()[0]
         short = np.sqrt(reached) < 0.995 * np.sqrt(self.minimum_noncentrality)  # numerical accuracy
         return list(dict.fromkeys(self.effects[index].name for index in np.flatnonzero(short)))
-
-    def with_repeats(self, counts: Array) -> Array:
-        """Add a repeat of one test in each direction with more than two tests, to show drift and noise.
-
-        Args:
-            counts: number of runs of each test, (tests,).
-
-        Returns:
-            Number of runs of each test, (tests,); the least useful runs make room for the repeats.
-        """
-        for place in np.unique(self.budget.place[counts > 0]):
-            chosen = np.flatnonzero((counts > 0) & (self.budget.place == place))
-            if chosen.size > 2 and counts[chosen].max() < 2:
-                quickest = chosen[np.argsort(self.budget.minutes[chosen])][:4]
-                counts = min(self.with_one_repeat(counts, quickest), key=self.objective, default=counts)
-        return counts
-
-    def with_noise_repeats(self, counts: Array) -> Array:
-        """Repeat sweeps until their repeats determine the random noise of points, apart from differences of runs.
-
-        Args:
-            counts: number of runs of each test, (tests,).
-
-        Returns:
-            Number of runs of each test, (tests,). Unless there are targets, the errors grow by at most 5 %.
-        """
-        # 0.1 in the logarithm of the variance is a twentieth of the error
-        largest = np.inf if self.goals else self.objective(counts) + 0.1
-        while not self.determines_noise(counts):
-            freedom = self.noise_freedom(counts)
-            sweeps = [test for test in np.flatnonzero(counts).tolist() if freedom_per_repeat(self.tests[test])]
-            choices = [
-                runs
-                for runs in self.with_one_repeat(counts, sweeps)
-                if self.noise_freedom(runs) > freedom and self.objective(runs) <= largest
-            ]
-            if not choices:
-                break
-            counts = min(choices, key=self.objective)
-        return counts
 
     def with_one_repeat(self, counts: Array, tests: Iterable[int]) -> Iterator[Array]:
         """Yield variants of a plan: in each, one of the given tests has one more run.

@@ -32,7 +32,7 @@ from bushfit.prediction.caveats import (
     unfitted_warnings,
 )
 from bushfit.prediction.conditions import OperatingPoints, PredictedPlace, rubber_conditions
-from bushfit.prediction.superposed import LargeMotion, models_with_time_law, superposed_stiffness_and_slopes
+from bushfit.prediction.superposed import LargeMotion, models_with_time_law
 from bushfit.reading.preload import Preload
 from bushfit.reading.runs import nominal_amplitudes
 from bushfit.units import number
@@ -133,7 +133,6 @@ def predict(
     points = OperatingPoints(direction, frequency, amplitude, conditions)
     if over:
         models, untimed = models_with_time_law(result, f"{direction}, with the large motion", rig=rig)
-        over.check_superposable(direction, frequency)
         both = np.array([over.frequency or frequency.min()]), np.array([abs(over.displacement) + amplitude.max()])
         subject = f"{direction}, with the large motion"
         together = extrapolations(result, OperatingPoints(direction, *both, conditions), subject)
@@ -214,7 +213,7 @@ def predict_with_model(result: Result, model: Model, points: OperatingPoints, ov
     (direction, frequency, amplitude, conditions), errors = points, uncertainty(result, model, points)
     names = errors.covariance.names
     if over:
-        stiffness, slopes = superposed_stiffness_and_slopes(model, points, over, names)
+        stiffness, slopes = over.stiffness_and_slopes(model, points, names)
     else:
         stiffness, slopes = stiffness_and_slopes(model, direction, frequency, amplitude, names, conditions=conditions)
     slopes = np.concatenate((slopes, errors.relative * stiffness))

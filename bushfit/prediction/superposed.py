@@ -45,32 +45,28 @@ class LargeMotion:
         size = format_range(unit, factor * self.displacement)
         return f"{number(self.frequency, 3)} Hz {size}" if self.frequency else size
 
-    def history(self, frequency: float, amplitude: float) -> History:
-        """Steady motion together with a small harmonic.
-
-        The slow frequency is adjusted until two slow cycles contain an odd number of cycles of the harmonic; then no
-        overtone of the slow motion coincides with the harmonic.
+    def stiffness_and_slopes(self, model: Model, points: OperatingPoints, names: Sequence[str]) -> tuple[Array, Array]:
+        """Complex stiffness of a small harmonic on this motion, and its derivatives with respect to parameters.
 
         Args:
-            frequency: frequency of the small harmonic [Hz].
-            amplitude: zero-to-peak amplitude of the small harmonic [m, rad or 1].
-        """
-        cycles = 2 * round(frequency / self.frequency - 0.5) + 1 if self.frequency else 1
-        phase = 2.0 * np.pi * np.arange(cycles * _SAMPLES) / _SAMPLES
-        slow = np.sin(2.0 * phase / cycles) if self.frequency else 1.0
-        return History.steady(self.displacement * slow + amplitude * np.sin(phase), frequency, cycles)
+            model: model; the derivatives are taken at its parameter values.
+            points: frequencies and amplitudes of the small harmonic.
+            names: names of k parameters.
 
-    def check_superposable(self, place: Place, frequency: Array) -> None:
-        """Check that the small harmonic can be superposed on this motion.
-
-        Args:
-            place: direction or specimen of the small harmonic.
-            frequency: frequencies of the small harmonic [Hz], (n,).
+        Returns:
+            Complex stiffness [N/m or N m/rad], (n,), and its derivatives per SI unit of each parameter, (k, n).
 
         Raises:
             ModelError: the motion is of another kind than the direction, or it is not slow compared with the small
                 harmonic.
+
+        Notes:
+            The stiffness belongs to the force component at the frequency of the small harmonic in the steady state, a
+            mean over the slow cycle. The slow frequency is adjusted until two slow cycles contain an odd number of
+            cycles of the harmonic; then no overtone of the slow motion coincides with the harmonic. An unnamed
+            correction is applied as if there were no slow motion.
         """
+        place, frequency = points.place, points.frequency
         if place.motion.displacement_unit != self.unit:
             expected = f"a motion in {place.display.displacement.name}"
             raise ModelError("not a motion of this direction", place=str(place), found=self.unit, expected=expected)
@@ -83,36 +79,19 @@ class LargeMotion:
                 expected=f"{_SLOW:g} to {_SLOWEST:g} times {number(self.frequency, 3)} Hz",
                 hint="choose others with --frequencies",
             )
-
-
-def superposed_stiffness_and_slopes(
-    model: Model, points: OperatingPoints, motion: LargeMotion, names: Sequence[str]
-) -> tuple[Array, Array]:
-    """Complex stiffness of a small harmonic on a large motion, and its derivatives with respect to parameters.
-
-    Args:
-        model: model; the derivatives are taken at its parameter values.
-        points: frequencies and amplitudes of the harmonic.
-        motion: slow motion or offset.
-        names: names of k parameters.
-
-    Returns:
-        Complex stiffness [N/m or N m/rad], (n,), and its derivatives per SI unit of each parameter, (k, n).
-
-    Notes: the stiffness belongs to the force component at the frequency of the small harmonic in the steady state, a
-    mean over the slow cycle. An unnamed correction is applied as if there were no slow motion.
-    """
-    named, columns = model.without(UNNAMED), []
-    for hertz, size in zip(points.frequency, points.amplitude, strict=True):
-        history = motion.history(float(hertz), float(size))
-        force, slopes = force_and_slopes(named, points.place, history, names, points.conditions)
-        line = history.value.size // _SAMPLES
-        spectrum = np.fft.rfft(np.concatenate((history.value[None], force[None], slopes)))[:, line]
-        columns.append(spectrum[1:] / spectrum[0])
-    response = np.array(columns).T
-    if model.unnamed:
-        response *= correction_factor(model, points)
-    return response[0], response[1:]
+        named, columns = model.without(UNNAMED), []
+        for hertz, size in zip(frequency.tolist(), points.amplitude.tolist(), strict=True):
+            cycles = 2 * round(hertz / self.frequency - 0.5) + 1 if self.frequency else 1
+            phase = 2.0 * np.pi * np.arange(cycles * _SAMPLES) / _SAMPLES
+            slow = np.sin(2.0 * phase / cycles) if self.frequency else 1.0
+            history = History.steady(self.displacement * slow + size * np.sin(phase), hertz, cycles)
+            force, slopes = force_and_slopes(named, place, history, names, points.conditions)
+            spectrum = np.fft.rfft(np.concatenate((history.value[None], force[None], slopes)))[:, cycles]
+            columns.append(spectrum[1:] / spectrum[0])
+        response = np.array(columns).T
+        if model.unnamed:
+            response *= correction_factor(model, points)
+        return response[0], response[1:]
 
 
 def correction_factor(model: Model, points: OperatingPoints) -> Array:

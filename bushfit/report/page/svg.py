@@ -71,7 +71,6 @@ def picture(chart: Chart, name: str, title: str) -> Picture:
     ElementTree.register_namespace("", _SVG.strip("{}"))
     root = ElementTree.parse(io.BytesIO(image)).getroot()
     _rewrite(root, name)
-    _share_attributes(root)
     root.attrib.clear()
     root.attrib |= {
         "viewBox": f"0 0 {width:.1f} {height:.1f}",
@@ -86,7 +85,10 @@ def picture(chart: Chart, name: str, title: str) -> Picture:
 
 
 def _rewrite(root: ElementTree.Element, prefix: str) -> None:
-    """Simplify an SVG: no metadata or style sheets, styles as attributes, short numbers, identifiers with a prefix."""
+    """Simplify an SVG: no metadata or style sheets, styles as attributes, short numbers, identifiers with a prefix.
+
+    Attributes that all children of a group share are moved to the group, and attributes that a marker repeats dropped.
+    """
     for parent in list(root.iter()):
         for child in list(parent):
             if child.tag in (f"{_SVG}metadata", f"{_SVG}style"):
@@ -114,10 +116,6 @@ def _rewrite(root: ElementTree.Element, prefix: str) -> None:
             element.set(key, re.sub(r"\s*([A-Za-z])\s*", r"\1", value).strip() if key == "d" else value)
         if element.get("transform", "").startswith("rotate(-0 "):
             del element.attrib["transform"]
-
-
-def _share_attributes(root: ElementTree.Element) -> None:
-    """Move attributes that all children of a group share to the group, and drop attributes that a marker repeats."""
     shapes = {f"#{element.get('id')}": element for element in root.iter() if element.get("id")}
     for marker in root.iter(f"{_SVG}use"):
         for key in {*marker.attrib} & {*shapes[marker.get("href", "")].attrib}:
