@@ -16,7 +16,6 @@ from scipy import stats
 from bushfit.batch.comparison import capability, find_outliers, smallest_deviation
 from bushfit.batch.document import Estimate, RowFile
 from bushfit.batch.summary import BatchResult
-from bushfit.report.page.index import summarize_warnings
 
 
 @pytest.fixture(scope="module")
@@ -55,8 +54,6 @@ def test_the_page_lists_a_warning_once_with_the_number_of_its_parts(made, docume
     heads = [line.removeprefix("<li>").partition(": ")[0].partition(",")[0] for line in listed]
     wanted = [f"{len(names)} parts" if len(names) > 1 else min(names) for names in kinds.values()]
     assert sorted(heads) == sorted(wanted)
-    pair = [("P1", "a gap of 1.5 %"), ("P2", "a gap of 2 %")]
-    assert summarize_warnings(pair) == "2 parts, such as P1: a gap of 1.5 %"
 
 
 def test_capability_is_that_of_fixed_limits(table, document):

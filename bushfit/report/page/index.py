@@ -1,6 +1,5 @@
 """Content of the page of a batch, `index.html`: parts that fail or differ, statistics, and a table of all parts."""
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -66,7 +65,11 @@ def index_page(batch: BatchFile, folder: Path, base: str = "") -> str:
     for index in chosen:
         for warning in caveats[index]:
             warnings.setdefault(warning.kind, []).append((parts[index].name, warning.text))
-    numbers = {kind: number for number, kind in enumerate(warnings, start=1)}
+    numbers, summaries = {kind: number for number, kind in enumerate(warnings, start=1)}, list[str]()
+    for named in warnings.values():  # such as "3 parts, such as A7: ..." with the warning of the first part
+        names, lines = (list(dict.fromkeys(column)) for column in zip(*named, strict=True))
+        several = f"{len(names)} parts{', such as ' + names[0] if len(lines) > 1 else ''}"
+        summaries.append(f"{names[0] if len(names) == 1 else several}: {lines[0]}")
     for index in chosen:
         is_known = has_curves and np.isfinite(relative[index]).all()
         mean = 100.0 * np.expm1(np.log1p(relative[index]).mean()) if is_known else None
@@ -92,18 +95,7 @@ def index_page(batch: BatchFile, folder: Path, base: str = "") -> str:
         "labels": labels,
         "columns": ["measured stiffness, deviation [%]"] * has_curves + [*batch.quantities],
         "rows": rows,
-        "warnings": [summarize_warnings(named) for named in warnings.values()],
+        "warnings": summaries,
         "shown": (len(first), important, len(chosen) - len(first)),
     }
     return render_page("index.html", context)
-
-
-def summarize_warnings(named: Sequence[tuple[str, str]]) -> str:
-    """Summarise warnings of one kind in a text such as "3 parts, such as A7: ..." with the warning of the first part.
-
-    Args:
-        named: name of the part and text of each warning.
-    """
-    names, lines = (list(dict.fromkeys(column)) for column in zip(*named, strict=True))
-    several = f"{len(names)} parts{', such as ' + names[0] if len(lines) > 1 else ''}"
-    return f"{names[0] if len(names) == 1 else several}: {lines[0]}"

@@ -3,6 +3,7 @@
 import math
 import re
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -26,8 +27,6 @@ _MOST_NAMED, _MOST_LETTERS = 3, 60
 _FURTHEST = 12.0
 #: Columns of panels, and largest number of panels of a figure, which is then one metre high.
 _COLUMNS, _MOST_PANELS = 2, 40
-#: Width of a line [point].
-_STROKE = 1.3
 #: Largest number of curves of single parts in a figure.
 _MOST_CURVES = 6
 #: Header of a column with one point of the measured stiffness curves.
@@ -156,10 +155,11 @@ def curves_figure(headers: Sequence[str], usual: Array, singles: Mapping[str, Ar
     figure = style.Chart(f"Dynamic stiffness as measured: {place}, {level}", style.ROW)
     axes = figure.subplots()
     axes.fill_between(x, usual.min(axis=0), usual.max(axis=0), color=style.GREY, alpha=0.3, lw=0, label="other parts")
-    axes.plot(x, np.median(usual, axis=0), color=style.INK, lw=_STROKE, label="median")
+    axes.plot(x, np.median(usual, axis=0), color=style.INK, lw=style.LINE, label="median")
     named = dict([*singles.items()][:_MOST_CURVES])
     for look, (name, values) in zip(style.styles(len(named), "loop"), named.items(), strict=True):
-        axes.plot(x, values, color=look.color, marker=look.marker, lw=_STROKE, **style.POINT, label=shorten(name, 24))
+        line: dict[str, Any] = {"color": look.color, "marker": look.marker, "lw": style.LINE, **style.POINT}
+        axes.plot(x, values, label=shorten(name, 24), **line)
     style.label_axes(axes, x_label, f"|K| [{unit}]", x)
     axes.legend()
     names = f" Single curves: {', '.join(named)}." if named else ""

@@ -9,8 +9,6 @@ from bushfit.report.plots import style
 from bushfit.report.tables import shorten
 from bushfit.units import display_unit, format_range, split_header
 
-#: Width of a line [point].
-_STROKE = 1.3
 #: Approximate number of markers on a line; markers distinguish lines in grey print.
 _MARKS = 5
 #: Smallest span of an axis of relative differences [%] and of differences of the loss factor.
@@ -56,17 +54,17 @@ def comparison_figure(comparison: ComparisonFile) -> style.Chart:
                 band, look = scale * one.band(side + header), looks[label]
                 for drawn_level, dashes in zip(levels, style.DASHES, strict=False):
                     drawn_x, (value, low, high) = x[level == drawn_level], band[:, level == drawn_level]
-                    line = axes.plot(drawn_x, value, color=look.color, ls=dashes, lw=_STROKE)[0]
+                    line = axes.plot(drawn_x, value, color=look.color, ls=dashes, lw=style.LINE)[0]
                     line.set(marker=look.marker, markevery=max(value.size // _MARKS, 1), **style.POINT)
                     # transparent: bands of several results overlap
                     axes.fill_between(drawn_x, low, high, color=look.color, alpha=0.18, lw=0)
             style.label_axes(axes, x_header, y_label, reference.table[x_header].to_numpy())
             if least_span:
-                axes.axhline(0.0, color=looks[first].color, lw=_STROKE)
+                axes.axhline(0.0, color=looks[first].color, lw=style.LINE)
                 style.widen_span(axes, least_span)
         lines = [style.Style(look.color, "-", look.marker).handle(True) for look in looks.values()]
         level_names = [format_range(split_header(fixed_header)[1] or "", float(level)) for level in levels]
-        dashed = [Line2D([], [], color=style.INK, lw=_STROKE, ls=dashes) for dashes in style.DASHES[: len(levels)]]
+        dashed = [Line2D([], [], color=style.INK, lw=style.LINE, ls=dashes) for dashes in style.DASHES[: len(levels)]]
         names = [f"{label}: {shorten(name, 20)}" for label, name in comparison.names.items()]
         style.legend(grid[2 * row, 1], lines, names, "", dict(zip(level_names, dashed, strict=True)))
     return figure.explain(

@@ -29,7 +29,7 @@ from bushfit.units import display_unit, format_range
 #: Height of a panel of residuals [cm].
 _STRIP = 2.6
 #: Number of points of a line of the model.
-_FINE = 30
+FINE = 30
 #: Largest number of rows of a loop that are drawn.
 _MOST_ROWS = 240
 #: Stated relative error above which a point is not drawn, because its scatter would hide other points.
@@ -104,10 +104,10 @@ def draw_curves(panels: Sequence[Axes], group: SweepGroup, result: Result) -> No
             modelled = pd.Series(table_stiffness(curve.rows, group.place, "model ")).groupby(x).mean()
             line = modelled.index.to_numpy(), modelled.to_numpy()
         else:
-            fine = np.geomspace(x.min(), x.max(), _FINE)
+            fine = np.geomspace(x.min(), x.max(), FINE)
             axes = (fine, curve.level / length) if group.axis == "frequency" else (curve.level, fine / length)
             line = fine, result.model.stiffness(group.place, *np.broadcast_arrays(*axes))
-        pair.plot(*line, color=look.color, ls=look.dashes, lw=1.3)
+        pair.plot(*line, color=look.color, ls=look.dashes, lw=style.LINE)
     names = [shorten(curve.name, 30) for curve in group.curves]
     if shares_levels:
         style.name_levels(panels[-1], names, group.palette)

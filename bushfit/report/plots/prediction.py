@@ -16,19 +16,17 @@ from bushfit.prediction.static_curve import StaticCurve
 from bushfit.prediction.stiffness import Prediction, predict
 from bushfit.reading.runs import nominal_amplitudes
 from bushfit.report.plots import style
-from bushfit.report.plots.fits import draw_curves, points_note, points_to_draw
+from bushfit.report.plots.fits import FINE, draw_curves, points_note, points_to_draw
 from bushfit.report.plots.measured import Axis, header_of, rows_at_conditions, sweep_groups, table_stiffness
 from bushfit.report.plots.pairs import ResponsePair
 from bushfit.report.tables import IF_RIGS, displacement_header, quantity_words, spread_indices
 from bushfit.units import display_unit, format_range
 
-#: Number of points of a line of the model.
-_FINE = 30
 #: Largest number of levels drawn over each quantity: six amplitudes over frequency, four frequencies over amplitude.
 #: More bands would overlap.
 _MOST_LEVELS: dict[Axis, int] = {"frequency": 6, "amplitude": 4}
-#: Line widths [point]: model, model with the effects of the rig, double line, and white core of the double line.
-_LINE, _THIN, _DOUBLE, _CORE = 1.3, 0.6, 2.4, 0.7
+#: Line widths [point]: model with the effects of the rig, double line, and white core of the double line.
+_THIN, _DOUBLE, _CORE = 0.6, 2.4, 0.7
 #: Largest relative distance of a measured or nominal level from the predicted level that it belongs to.
 _SAME = 0.01
 
@@ -58,7 +56,7 @@ def prediction_figure(
     frequencies, amplitudes = np.unique(prediction.frequency), np.unique(prediction.amplitude)
     if not prediction.over:  # which takes too long to repeat
         fine_axes = [
-            values if values.size < 2 else np.union1d(values, np.geomspace(values[0], values[-1], _FINE))
+            values if values.size < 2 else np.union1d(values, np.geomspace(values[0], values[-1], FINE))
             for values in (frequencies, amplitudes)
         ]
         conditions: Any = {key: getattr(prediction.conditions, key) for key in ("temperature", "preload")}
@@ -118,7 +116,7 @@ def static_figure(curves: Sequence[StaticCurve], title: str) -> style.Chart:
         for line in (one.loading, one.unloading):
             panels[0].plot(x, factor * line.value, color=look.color, lw=_THIN)
         for axes, band, scale in zip(panels, (one.mean, one.slope), (factor, slope_factor), strict=True):
-            style.draw_band(axes, x, scale * band.ends, look, lw=_LINE)
+            style.draw_band(axes, x, scale * band.ends, look, lw=style.LINE)
     preloads = [one.conditions.preload for one in curves]
     if len(curves) > 1:
         handles = [look.handle(False) for look in style.styles(len(curves), "loop")]
@@ -167,7 +165,7 @@ def draw_prediction(
         mask, rows = getattr(prediction, fixed) == levels[index], points_to_draw(points[index])
         bands = [band.ends[:, mask] for band in (prediction.stiffness, prediction.loss_factor)]
         marker = "_" if mask.sum() == 1 else ""  # a single point is a stroke
-        pair.draw_bands(x[mask], bands, look, lw=_LINE, marker=marker, ms=14.0)
+        pair.draw_bands(x[mask], bands, look, lw=style.LINE, marker=marker, ms=14.0)
         if prediction.if_in_rig is not None:
             pair.plot(x[mask], prediction.if_in_rig.complex_stiffness[mask], color=look.color, lw=_DOUBLE)
             pair.plot(x[mask], prediction.if_in_rig.complex_stiffness[mask], color="white", lw=_CORE)
@@ -180,7 +178,7 @@ def draw_prediction(
         style.widen_span(axes, span)
     extra_lines: dict[str, Line2D | tuple[Line2D, ...]] = {}
     if (with_rig := bool(measured[chosen].any() and rig)) or prediction.if_in_rig:
-        extra_lines["bushing"] = Line2D([], [], color=style.INK, lw=_LINE)
+        extra_lines["bushing"] = Line2D([], [], color=style.INK, lw=style.LINE)
     if with_rig:
         extra_lines["with the rig"] = Line2D([], [], color=style.INK, lw=_THIN, marker="o", **style.POINT)
     if prediction.if_in_rig:

@@ -42,6 +42,8 @@ TEXT, SMALL = _STYLE["axes.labelsize"], _STYLE["legend.fontsize"]
 #: Marker options of a measured point, and of one of thousands of points.
 POINT: dict[str, Any] = {"ms": 4.2, "mec": "white", "mew": 0.4}
 DOT: dict[str, Any] = {"ms": 2.4, "mew": 0}
+#: Width of a line [point].
+LINE = 1.3
 #: Colours: text and neutral lines, explanations, shaded bands, and outliers.
 INK, GREY, SHADE, RED = "#1a1a1a", "#595959", "#ebebeb", "#c1121f"
 #: Font options of axis names and of smaller text.
@@ -167,7 +169,7 @@ class Style(NamedTuple):
 
     def handle(self, marked: bool) -> Line2D:
         """Make the legend entry of this style: a line, and its marker if `marked` is true."""
-        return Line2D([], [], color=self.color, ls=self.dashes, lw=1.3, marker=self.marker * marked, **POINT)
+        return Line2D([], [], color=self.color, ls=self.dashes, lw=LINE, marker=self.marker * marked, **POINT)
 
 
 def styles(count: int, palette: str) -> list[Style]:
