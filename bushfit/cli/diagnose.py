@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,7 +10,7 @@ import click
 from rich.markup import escape
 
 from bushfit.caveat import join_names
-from bushfit.cli.options import command_called, file_option, option, option_group
+from bushfit.cli.options import TYPED, command_called, file_option, option, option_group
 from bushfit.cli.output import Output, with_output
 from bushfit.cli.printing import print_parameters, print_tests, print_validations
 from bushfit.cli.shared_options import campaign_options, exit_above, open_campaign, quantity
@@ -75,7 +74,7 @@ def command(
     folder = output.folder(campaign.name, "diagnosis.json", "model.json")
     diagnosed = diagnose(campaign, model=start, **settings)
     output.warn(diagnosed.data.notes)
-    print_diagnosis(output, diagnosed, " ".join(map(quote_path, ["bushfit", *sys.argv[1:]])))
+    print_diagnosis(output, diagnosed, click.get_current_context().meta[TYPED])
     output.write(folder, diagnosed.files, diagnosed.document, input_files(campaign, model))
     exit_above(max_nrmse, diagnosed.result)
 

@@ -6,11 +6,13 @@ from typing import Any
 
 import click
 
-from bushfit.errors import error_location
+from bushfit.errors import error_location, quote_path
 
 Function = Callable[..., Any]
 #: Decorator that adds an option or an argument to the function of a command.
 Parameter = Callable[[Function], Function]
+#: Key of the command line as the user typed it, in `meta` of the context of a command.
+TYPED = "bushfit.typed"
 #: Type of an option or an argument that names a file or a folder.
 FILE = click.Path(path_type=Path)
 #: Maximum width of option names in help texts [characters]; the text of longer names starts on the next line.
@@ -79,6 +81,7 @@ class Command(click.Command):
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Parse the command line, and combine the options of each group with a `record` into one argument."""
+        ctx.meta[TYPED] = f"{ctx.command_path} {' '.join(map(quote_path, args))}"
         rest, records = super().parse_args(ctx, args), dict[Record, dict[str, Any]]()
         for parameter in self.params:
             if (record := getattr(parameter, "record", None)) and parameter.expose_value:

@@ -106,7 +106,15 @@ def diagnose(
     data, start = prepare_tests(campaign, loss), as_result(model) if model else None
     unresolved = [name for name in start.unresolved if name not in adopt] if start else []
     settings = DiagnosisSettings(max_effects, tolerance, tuple(adopt), tuple(without), tuple(unresolved))
-    _require_free_parameter(data, start.model if start else None, settings)
+    parameters = (start.model if start else Model.with_defaults(data.campaign.bushing, data.effects, {})).parameters
+    if not (adopt or data.free_names(tuple(parameters))):
+        raise FitError(
+            "there is nothing to fit, and so nothing to diagnose",
+            file=data.campaign.path,
+            place="[fit]",
+            found="every parameter is fixed by vary = false",
+            hint="bushfit fit shows how well the given values meet the tests; to diagnose, free a parameter",
+        )
     numbers = {"max_effects": max_effects, "tolerance": tolerance}
     changed = {key: f"{number:g}" for key, number in numbers.items() if number != getattr(DiagnosisSettings, key)}
     options = option_words(model="MODEL.json" if start else None, adopt=adopt, without=without, **changed)
@@ -137,22 +145,3 @@ def diagnose(
     files.append(ResultFile("report", "page", partial(report_page, files)))
     rivals = () if start or adopt else next(iter(undecided_effects(diagnosis)), ())
     return DiagnosisOutput(data, diagnosis, document, files, validations, rivals)
-
-
-def _require_free_parameter(data: PreparedCampaign, model: Model | None, settings: DiagnosisSettings) -> None:
-    """Raise a FitError if no parameter is free and no effect is added.
-
-    Args:
-        data: campaign, prepared for a fit.
-        model: starting model; None for the model of [fit].
-        settings: settings of the diagnosis, with the effects to add.
-    """
-    model = model or Model.with_defaults(data.campaign.bushing, data.effects, {})
-    if not (settings.adopt or data.free_names(tuple(model.parameters))):
-        raise FitError(
-            "there is nothing to fit, and so nothing to diagnose",
-            file=data.campaign.path,
-            place="[fit]",
-            found="every parameter is fixed by vary = false",
-            hint="bushfit fit shows how well the given values meet the tests; to diagnose, free a parameter",
-        )

@@ -186,12 +186,6 @@ def _scale_loss(factor: float, stiffness: Complex) -> Complex:
     return np.asarray(np.abs(stiffness) * loss / np.abs(loss))
 
 
-def _loss_from_sine(stiffness: Complex) -> Complex:
-    """Correct complex stiffnesses, (n,), whose stated loss factor is the sine of the loss angle; |K| is unchanged."""
-    sine = np.clip(stiffness.imag / stiffness.real, -1.0, 1.0)
-    return np.asarray(np.abs(stiffness) * (np.sqrt(1.0 - sine**2) + 1j * sine))
-
-
 #: Functions and motions by their names in mistakes.toml: true stiffness from stated stiffness, condition, or motion.
 _LAWS: dict[str, Any] = {
     # the phase is 90 deg less
@@ -200,7 +194,8 @@ _LAWS: dict[str, Any] = {
     "turned": lambda k: np.abs(k) * np.exp(1j * np.degrees(1.0) * np.angle(k)),
     "hundredth_of_loss": partial(_scale_loss, 0.01),
     "hundredfold_loss": partial(_scale_loss, 100.0),
-    "sine": _loss_from_sine,
+    # the stated loss factor is the sine of the loss angle
+    "sine": lambda k: np.abs(k) * np.exp(1j * np.arcsin(np.clip(k.imag / k.real, -1.0, 1.0))),
     # K' was given as |K|
     "magnitude": lambda k: k * np.abs(k) / k.real,
     # |K| was given as K', with the correct K''

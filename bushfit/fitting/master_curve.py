@@ -61,7 +61,10 @@ def master_curve(result: Result, sweeps: Sequence[MeasuredSweep]) -> tuple[Shift
             at_reference = model.stiffness(sweep.direction, sweep.frequency * pace, sweep.amplitude)
             reduced = sweep.measured * at_reference / sweep.response(model)
             temperature = float(np.mean(sweep.temperature))
-            shift, error = _shift_by_law(result, temperature)
+            law, stderr = model.values[SHIFT], result.covariance.stderr(SHIFT)
+            near = (model.with_values({SHIFT: law + share * (stderr or 0.0)}) for share in (-_APART, 0.0, _APART))
+            low, shift, high = (float(np.log(one.shift_factor(RubberConditions(temperature)))) for one in near)
+            error = abs(high - low) / (2.0 * _APART) if stderr else np.nan
             further, unsure = _further_shift(model, sweep)
             laws = (shift, error), (shift + further, unsure)
             curves.append(ShiftedSweep(sweep, temperature, *laws, sweep.frequency * pace, reduced))
@@ -71,19 +74,6 @@ def master_curve(result: Result, sweeps: Sequence[MeasuredSweep]) -> tuple[Shift
 def can_shift(sweep: Sweep) -> bool:
     """True if a sweep can be part of a master curve: it is over frequency, and its temperature is known."""
     return sweep.temperature is not None and np.unique(sweep.frequency).size >= _FREQUENCIES
-
-
-def _shift_by_law(result: Result, temperature: float) -> tuple[float, float]:
-    """Fitted shift factor ln a_T at a temperature [K], and its standard error; nan if the error is unknown."""
-    value, error, conditions = (
-        result.model.values[SHIFT],
-        result.covariance.stderr(SHIFT),
-        RubberConditions(temperature),
-    )
-    values = (value + share * (error or 0.0) for share in (-_APART, 0.0, _APART))
-    factors = [result.model.with_values({SHIFT: value}).shift_factor(conditions) for value in values]
-    low, middle, high = np.log(factors).tolist()
-    return middle, abs(high - low) / (2.0 * _APART) if error else np.nan
 
 
 def _further_shift(model: Model, sweep: MeasuredSweep) -> tuple[float, float]:

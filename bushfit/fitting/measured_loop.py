@@ -179,6 +179,11 @@ class MeasuredLoop(MeasuredBase):
         return self.residual_count / (1.0 if self.fundamental_only else self.row_noise.rows_as_one)
 
     @property
+    def response_size(self) -> Array:
+        """Half the range of the measured force without outliers [N or N m]."""
+        return np.array(self.half_range)
+
+    @property
     def relative_noise(self) -> float:
         """Standard deviation of the noise of one row, relative to half the force range."""
         return self.noise / self.half_range
@@ -226,11 +231,7 @@ class MeasuredLoop(MeasuredBase):
 
     def relative_difference(self, model: Model) -> Array:
         """Model minus measured force at each row, relative to half the measured force range, (1, n)."""
-        return (self._difference(model) / self.half_range)[None]
-
-    def largest_difference(self, model: Model, reference: Model) -> float:
-        """Largest difference between the forces of two models, relative to half the force range."""
-        return float(np.abs(self.response(model) - self.response(reference)).max() / self.half_range)
+        return (self._difference(model) / self.response_size)[None]
 
     def misfit(self, model: Model) -> Array:
         """Model minus measured force at each row, in units of the row's noise, (n,); 0 at rows without weight."""
@@ -354,7 +355,7 @@ class MeasuredLoop(MeasuredBase):
 
         It is a sum of independent errors: cosine and sine of harmonics 1 to 25, of equal size up to the fifth and
         falling as 1/h above, and an offset; for a loop from rest, also the same harmonics in the first cycle alone, and
-        a drift. Without `first_harmonic_errs`, the rig's gain error replaces the first harmonic.
+        a drift.
         """
         phase = self.phase
         waves = basis(phase, _ERROR_HARMONICS).T[1:] * np.tile(_ERROR_SIZES, 2)[:, None]
@@ -363,10 +364,23 @@ class MeasuredLoop(MeasuredBase):
             drift = np.cos(np.pi * order * phase / self.cycles) / (1.0 + order)
             waves = np.concatenate((waves, waves * (phase < 1.0), drift))
         rows = self._whiten_rows(waves * (self._per_noise * self.half_range))
-        if not self.first_harmonic_errs:
-            rows[[0, _ERROR_HARMONICS]] = 0.0
-            rows[0] = self.gain_error / self.model_error * self._unit_gain
         return SharedErrors.from_columns(np.concatenate((rows, _ERROR_SIZES[:1, None] * self._unit_offset)))
+
+    @cached_property
+    def model_errors(self) -> SharedErrors:
+        """Error of the model with the standard deviation `model_error`, as correlated errors of the residuals.
+
+        Without `first_harmonic_errs`, the rig's gain error replaces the first harmonic of the force.
+        """
+        errors = replace(self.unit_model_error, deviations=self.model_error * self.unit_model_error.deviations)
+        if self.first_harmonic_errs:
+            return errors
+        waves = basis(self.phase, 1).T[1:] * (self._per_noise * self.half_range)
+        first = errors.components(self.model_error * _ERROR_SIZES[0] * self._whiten_rows(waves))
+        gain = errors.components(self.gain_error * self._unit_gain)
+        covariance = np.diag(np.square(errors.deviations)) - first.T @ first + np.outer(gain, gain)
+        variance, rotation = np.linalg.eigh(covariance)  # along the same directions, which are large
+        return replace(errors, deviations=np.sqrt(np.maximum(variance, 0.0)), rotation=rotation)
 
     def noise_sensitivity(self, influence: Array) -> dict[Hashable, Array]:
         """Change of the weights of the residuals in k estimates by one standard error of each noise variance.

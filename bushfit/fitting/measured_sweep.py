@@ -300,11 +300,8 @@ class MeasuredSweep(MeasuredBase):
     def noise_sensitivity(self, influence: Array) -> dict[Hashable, Array]:
         """Change of the weights of the residuals in k estimates by one standard error of each noise variance.
 
-        Args:
-            influence: change of each estimate per unit of each whitened residual, (k, 2 n).
-
         Returns:
-            Changes of `influence`, (k, 2 n), by identifier of the noise variance.
+            Changes of `influence`, (k, 2 n), by identifier of the noise variance; see `MeasuredLoop`.
 
         Notes:
             Within a run the derivatives of V are I with respect to s^2 and 1 1^T with respect to t^2; whitened, W^2
@@ -337,9 +334,6 @@ class MeasuredSweep(MeasuredBase):
 
         If the fit assumes a model error, errors shared by runs and levels are added; the independent model error is
         subtracted, because a smooth error of the model, which the fit adds separately, contains it.
-
-        Args:
-            influence: change of each estimate per unit of each whitened residual, (k, 2 n).
         """
         whitened = self.model_errors.whiten(influence)
         added = self.run_errors.covariance(whitened) + self._level_errors(self.per_noise).covariance(whitened)
@@ -349,9 +343,14 @@ class MeasuredSweep(MeasuredBase):
         """Return the sweep with random noise alone, without model error and errors that runs and levels share."""
         return replace(self, noise=replace(self.noise, shared=(0.0, 0.0), level=(0.0, 0.0)), model_error=0.0)
 
+    @property
+    def response_size(self) -> Array:
+        """Magnitude of the measured stiffness of each point, (n,) [N/m or N m/rad]."""
+        return np.abs(self.measured)
+
     def relative_difference(self, model: Model) -> Array:
         """Model minus measured stiffness relative to the measured |K|: real and imaginary part, (2, n)."""
-        difference = (self.response(model) - self.measured) / np.abs(self.measured)
+        difference = (self.response(model) - self.measured) / self.response_size
         return np.stack((difference.real, difference.imag))
 
     def normalised(self, deviation: Array, *, shared: bool = True) -> Array:

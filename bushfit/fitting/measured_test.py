@@ -47,6 +47,11 @@ class MeasuredBase(ABC):
     compliance_error: float = 0.0
     contradiction: Caveat | None = None
 
+    @property
+    @abstractmethod
+    def response_size(self) -> Array:
+        """Size of the measured response, to which differences are relative: |K|, (n,), or half the range of a force."""
+
     @abstractmethod
     def relative_difference(self, model: Model) -> Array:
         """Model minus measured at each of the n points, relative to the measured |K| or half the force range of a loop.
@@ -85,9 +90,14 @@ class MeasuredBase(ABC):
     def unit_model_error(self) -> SharedErrors:
         """Error of the model with a standard deviation of 100 % of |K|, or of half the force range of a loop."""
 
-    def with_model_error(self, size: float) -> Self:
-        """Return the test with a model error of this size, relative to |K| or half a loop's force range."""
-        test = replace(self, model_error=size)
+    def with_model_error(self, size: float, **changes: Any) -> Self:
+        """Return the test with a model error of this size, relative to |K| or half a loop's force range.
+
+        Args:
+            size: standard deviation of the model error.
+            changes: further fields of the test to replace that do not change its noise, such as `first_harmonic_errs`.
+        """
+        test = replace(self, model_error=size, **changes)
         test.__dict__["unit_model_error"] = self.unit_model_error
         return test
 
@@ -150,8 +160,7 @@ class MeasuredBase(ABC):
             Magnitude of the difference of the complex stiffness relative to |K|, or of the force relative to half the
             force range of a loop.
         """
-        difference = self.relative_difference(model) - self.relative_difference(reference)
-        return float(np.linalg.norm(difference, axis=0).max())
+        return float(np.max(np.abs(self.response(model) - self.response(reference)) / self.response_size))
 
     @cached_property
     def _cache(self) -> dict[str, tuple[Model, Any, Array]]:

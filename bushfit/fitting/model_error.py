@@ -142,10 +142,8 @@ def with_model_error(
     """
     if not plain_fit.names:
         return plain_fit, None
-    if not (certain or _exceeds_noise(_with_rig_errors(plain_fit, rig))):
-        thinned = plain_fit.reevaluate(plain_fit.model, _thin_sweeps(plain_fit.problem.tests))
-        if not _is_smooth(_with_rig_errors(thinned, rig)):
-            return plain_fit, None
+    if not (certain or _exceeds_noise(_with_rig_errors(plain_fit, rig)) or _is_smooth(plain_fit, rig)):
+        return plain_fit, None
     closest, size = closest_fit(plain_fit, bounds)
     if size >= SIZES[-1]:  # that is no error of a model, but another thing than it
         return plain_fit, None
@@ -223,7 +221,7 @@ def likeliest_model_error(model: Model, data_sets: Sequence[MeasuredTest], names
     rows = np.vstack(problem.linearise(model))
     errors = [(test.unit_model_error, block) for test, block in zip(data_sets, residual_slices(data_sets), strict=True)]
     products = rows @ rows.T
-    components = np.hstack([rows[:, block] @ error.directions * error.deviations for error, block in errors])
+    components = np.hstack([error.components(rows[:, block]) * error.deviations for error, block in errors])
     variance = np.concatenate([np.square(error.deviations) for error, _ in errors])
 
     def cost(log_size: float) -> float:
@@ -262,8 +260,7 @@ def log_likelihood(solution: FitResult, prior_precision: Mapping[str, float]) ->
         Natural log of the likelihood, up to a constant that is the same for all models.
     """
     size = max(test.model_error for test in solution.problem.tests)
-    bare = [replace(test, model_error=0.0) for test in solution.problem.tests]
-    tests = FittedTests(solution.reevaluate(solution.model, _thin_sweeps(bare, size)))
+    tests = FittedTests(solution.reevaluate(solution.model, _thin_sweeps(solution.problem.tests, size)))
     rows, residual = tests.free_jacobian, tests.solution.residual
     information, gain = rows @ rows.T, 0.0
     if size:
@@ -297,8 +294,9 @@ def _exceeds_noise(tests: FittedTests) -> bool:
     return any(excess_chi_square(square / count, count) is not None for square, count in pairs if count)
 
 
-def _is_smooth(tests: FittedTests) -> bool:
+def _is_smooth(plain_fit: FitResult, rig: RigSettings) -> bool:
     """True if the misfit is more probable with a smooth error of the model than with errors of noise and rig alone."""
+    tests = _with_rig_errors(plain_fit.reevaluate(plain_fit.model, _thin_sweeps(plain_fit.problem.tests)), rig)
     names = tuple(dict.fromkeys(tests.directions.tolist()))
     compound = Discrepancy.over_tests(tests, (names,), COMPOUND_LENGTHS, _FEW)
     # such an error is as probable before the tests as its absence
@@ -351,18 +349,18 @@ def _with_rig_errors(solution: FitResult, rig: RigSettings) -> FittedTests:
 
 
 def _thin_sweeps(tests: Sequence[MeasuredTest], error: float = 0.0) -> list[MeasuredTest]:
-    """Reduce dense sweeps to at most 600 evenly chosen points, enough to estimate a smooth error of the model.
+    """Reduce dense sweeps, without a model error, to at most 600 evenly chosen points, enough for a smooth error.
 
     Args:
-        tests: tests without a model error.
+        tests: tests.
         error: independent model error of the loops, which applies to the harmonics from the second up; the first
             harmonic changes with the stiffness.
     """
     thinned = list[MeasuredTest]()
     for test in tests:
         if isinstance(test, MeasuredLoop):
-            thinned.append(replace(test, model_error=error, first_harmonic_errs=False) if error else test)
+            thinned.append(test.with_model_error(error, first_harmonic_errs=False) if error else test)
         else:
-            step = -(-test.order.size // _ENOUGH)
-            thinned.append(test if step == 1 else test.select(np.arange(test.order.size) % step == 0))
+            bare, step = replace(test, model_error=0.0) if test.model_error else test, -(-test.order.size // _ENOUGH)
+            thinned.append(bare if step == 1 else bare.select(np.arange(test.order.size) % step == 0))
     return thinned

@@ -22,8 +22,8 @@ from bushfit.fitting.preparation import MeasuredTest, split_by_kind, with_gain_w
 from bushfit.fitting.problem import FitProblem, FitResult
 from bushfit.fitting.rig_class import largest_error
 from bushfit.fitting.robust import solve_problem
-from bushfit.geometry import STRAINING, Place, get_place
-from bushfit.model.result import Alternative, PreloadRange
+from bushfit.geometry import STRAINING, get_place
+from bushfit.model.result import Alternative
 from bushfit.reading.preload import SAME_PRELOAD
 from bushfit.units import number
 
@@ -58,12 +58,14 @@ def with_preload(data: PreparedCampaign) -> PreparedCampaign:
     fit, notes, has_influence = data.campaign.fit, list[Caveat](), False
     fixed: Sequence[str] = ()
     line = "square of the preload, because the bushing is symmetric"
+    places = [get_place(tested.place, data.campaign.specimens) for tested in ranges]
     if max(tested.count for tested in ranges) == 2:
         fixed = _ODD
-        if not all(_is_symmetric(tested, get_place(tested.place, data.campaign.specimens)) for tested in ranges):
+        # a tube and rubber in shear are symmetric, unlike bars in tension; opposite preloads would cancel
+        opposite = any(math.isclose(-tested.low, tested.high, rel_tol=SAME_PRELOAD) for tested in ranges)
+        if opposite or any(place.motion is STRAINING for place in places):
             fixed, line = _EVEN, "preload"
-    for tested in ranges:
-        place = get_place(tested.place, data.campaign.specimens)
+    for tested, place in zip(ranges, places, strict=True):
         tests = [test for test in data.data_sets if test.direction == place and test.conditions.preload]
         chance = _probability_of_chance(data, tests, fixed)
         listed = f"{tested.place}: {tested.count} preloads, {tested.text(place)}"
@@ -112,14 +114,6 @@ def alternative_preload_law(found: FitResult) -> tuple[Alternative, ...]:
     if fitted.chi_square > found.chi_square + _CHI_SQUARE_95:
         return ()
     return (Alternative(fitted.model, 0.5, covariance(fitted.model, [fitted.stage()], None, fitted.smooth_error)),)
-
-
-def _is_symmetric(tested: PreloadRange, place: Place) -> bool:
-    """True if a preload can have the same influence in both senses, as in a tube or in rubber in shear.
-
-    False for bars in tension, and for two preloads of equal size and opposite sense.
-    """
-    return place.motion is not STRAINING and not math.isclose(-tested.low, tested.high, rel_tol=SAME_PRELOAD)
 
 
 def _probability_of_chance(data: PreparedCampaign, tests: Sequence[MeasuredTest], fixed: Sequence[str]) -> float:

@@ -162,9 +162,10 @@ def _about_smooth_curve(steps: Array, log_stiffness: Array) -> LevelNoise:
     squared = dict(zip(steps.tolist(), squares.tolist(), strict=True))
 
     def of_points(chosen: Array) -> LevelNoise:
-        """Noise of the points of a mask, (n,), about the curve that is fitted to them by least squares."""
-        scatter = _project_out(basis[chosen], values[chosen])
-        return LevelNoise(scatter, len(scatter), np.empty((0, 2)))
+        """Noise of the points of a mask, (n,), about the curve of k functions fitted to them, as n - k residuals."""
+        (reflections, factors), _ = qr(basis[chosen], mode="raw")
+        turned, *_ = lapack.dormqr("L", "T", reflections, factors, values[chosen], lwork=values.shape[1])
+        return LevelNoise(turned[basis.shape[1] :], len(turned) - basis.shape[1], np.empty((0, 2)))
 
     calmer = of_points(np.arange(steps.size) != worst)
     return replace(of_points(inliers), without_largest=calmer if calmer.freedom else None, squared_distances=squared)
@@ -192,13 +193,6 @@ def disturbed_steps(levels: Iterable[LevelNoise]) -> list[float]:
 def to_unit_interval(values: Array) -> Array:
     """Scale values, (n,), linearly to the interval from -1 to 1, for Legendre polynomials; all -1 if they are equal."""
     return 2.0 * (values - values.min()) / max(float(np.ptp(values)), np.finfo(float).tiny) - 1.0
-
-
-def _project_out(basis: Array, values: Array) -> Array:
-    """Residuals of values, (n, m), after a least-squares fit of k functions, (n, k), as n - k independent rows."""
-    (reflections, factors), _ = qr(basis, mode="raw")
-    turned, *_ = lapack.dormqr("L", "T", reflections, factors, values, lwork=values.shape[1])
-    return np.asarray(turned[basis.shape[1] :])
 
 
 def _gain_and_phase(values: Array) -> Array:

@@ -23,14 +23,17 @@ class SharedErrors:
         directions: changes of the n residuals, in units of noise, due to r independent errors, as orthonormal columns,
             (n, r); a sparse array for very many groups.
         deviations: standard deviation of the change along each direction, (r,).
+        rotation: orthonormal combinations of the directions, as columns, (r, r), along which the errors are independent
+            with these deviations; None for the directions themselves.
 
     Notes:
-        The covariance of the residuals is S = 1 + D diag(s^2) D^T with the directions D and the deviations s.
+        The covariance of the residuals is S = 1 + D diag(s^2) D^T with the (rotated) directions D and the deviations s.
         S^(-1/2) = 1 - D diag(1 - 1/sqrt(1 + s^2)) D^T whitens the residuals.
     """
 
     directions: Any
     deviations: Array
+    rotation: Array | None = None
 
     @classmethod
     def from_columns(cls, columns: Array) -> SharedErrors:
@@ -65,6 +68,11 @@ class SharedErrors:
         directions[rows, of_residual] = entries
         return cls(directions, deviation)
 
+    def components(self, rows: Array) -> Array:
+        """Return the components of residuals, (..., n), along the r independent errors, (..., r)."""
+        along = rows @ self.directions
+        return np.asarray(along if self.rotation is None else along @ self.rotation)
+
     def whiten(self, rows: Array) -> Array:
         """Whiten residuals or derivatives in units of noise, (..., n): multiply by S^(-1/2) with their covariance S."""
         if not self.deviations.any():
@@ -77,7 +85,8 @@ class SharedErrors:
         Returns:
             Sum of the multiplied components, (..., n).
         """
-        return np.asarray((rows @ self.directions * factors) @ self.directions.T)
+        multiplied = self.components(rows) * factors
+        return np.asarray((multiplied if self.rotation is None else multiplied @ self.rotation.T) @ self.directions.T)
 
     def covariance(self, influence: Array) -> Array:
         """Covariance of k estimates due to the shared errors, (k, k).
@@ -85,5 +94,5 @@ class SharedErrors:
         Args:
             influence: change of each estimate per unit of each residual, (k, n).
         """
-        changes = influence @ self.directions * self.deviations
+        changes = self.components(influence) * self.deviations
         return np.asarray(changes @ changes.T)
