@@ -60,7 +60,6 @@ class MeasuredLoop(MeasuredBase):
             weighted. If False, the gain error only widens the errors of fitted parameters.
         first_harmonic_errs: True if the model error includes the first harmonic of the force. If False, a smooth error
             replaces it, and the gain error of the rig, stated or assumed, takes its place.
-
         histories: histories of the motion by their extent, once computed; copies of the loop share them.
 
     Notes:
@@ -309,8 +308,7 @@ class MeasuredLoop(MeasuredBase):
         """Whiten changes of the force at the rows, in units of noise, (..., n), so that noise has unit variance.
 
         Returns:
-            Whitened residuals, (..., size), without the correlation due to neighbouring rows and errors that rows
-            share.
+            Whitened residuals, (..., size), without correlation.
         """
         return self.shared_errors.whiten(self._whiten_rows(difference))
 
@@ -403,9 +401,6 @@ class MeasuredLoop(MeasuredBase):
 
         The gain error is added. The model error of the first harmonic is subtracted, because a smooth error of the
         model, which the fit adds separately, contains it.
-
-        Args:
-            influence: change of each estimate per unit of each whitened residual, (k, size).
         """
         first = self.model_error * _ERROR_SIZES[0] * self.force_changes(basis(self.phase, 1).T[1:])
         both = influence @ np.vstack((first, self.gain_error * self.gain_and_offset()[0])).T
