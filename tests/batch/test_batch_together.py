@@ -15,7 +15,10 @@ from scipy import stats
 
 from bushfit.batch.comparison import capability, find_outliers, smallest_deviation
 from bushfit.batch.document import Estimate, RowFile
+from bushfit.batch.quantities import measured_curve
 from bushfit.batch.summary import BatchResult
+from bushfit.geometry import Direction
+from bushfit.reading.measurement import Sweep
 
 
 @pytest.fixture(scope="module")
@@ -99,6 +102,16 @@ def test_a_part_without_the_sweep_of_the_others_is_named_and_not_compared():
     assert [*map(str, result.warnings(parts))] == [
         "no sweep, unlike the other parts, and so not compared with them: P6"
     ]
+
+
+@pytest.mark.parametrize(("count", "level"), [(1, 0.1), (2, 0.1), (3, 0.2), (4, 0.2)])
+def test_the_curve_of_a_part_is_the_mean_of_the_repeats_at_its_middle_level(count, level):
+    amplitude = np.repeat([1e-4, 2e-4, 4e-4, 8e-4][:count], 6)
+    frequency = np.tile([5.0, 25.0, 100.0], 2 * count)
+    stiffness = 1e9 * amplitude + 10.0 * frequency + np.tile(np.repeat([1.0, 3.0], 3), count) + 0j
+    found = measured_curve([Sweep("s", Direction.AXIAL, frequency, amplitude, stiffness)])
+    expected = {f"axial {f} Hz {level} mm": 1e6 * level + 10.0 * f + 2.0 for f in (5, 25, 100)}
+    assert found == pytest.approx(expected)
 
 
 @pytest.mark.parametrize("count", [5, 8, 30])

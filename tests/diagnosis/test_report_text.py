@@ -104,7 +104,7 @@ def test_pairs(paper_model, data_sets, one, other, words):
     assert deciding_test(models[::-1], EVEN, data_sets) == found
 
 
-@pytest.mark.parametrize("odds", [(1.0, 1.0), (0.8, 0.2)])
+@pytest.mark.parametrize("odds", [(1.0, 1.0), (0.8, 0.2), (1.0, 1e-5)])
 def test_what_stays_open_is_bounded_from_above(odds):
     """Against the entropy that is left of two normal distributions a distance apart, by integration."""
     p, x = np.array(odds) / sum(odds), np.linspace(-12.0, 20.0, 20_001)

@@ -283,6 +283,17 @@ def recorded(model: Model, *motions: Array, noise: float = 3e-3) -> Loop:
     return Loop("loop", Direction.AXIAL, clean.time, clean.displacement, clean.force + scatter)
 
 
+def test_a_record_from_rest_about_a_preload_keeps_its_virgin_curve(paper_model):
+    """The force is compared about its mean, over all rows from rest on."""
+    plain = recorded(paper_model, sine(2))
+    loaded = replace(plain, displacement=plain.displacement + 1e-3, force=plain.force + 300.0)
+    for loop, datum in ((plain, None), (loaded, pytest.approx(300.0, rel=0.2))):
+        prepared = prepare_loop(loop)
+        residual = prepared.residual(paper_model)
+        assert (prepared.from_rest, prepared.datum) == (True, datum)
+        assert residual @ residual / residual.size < 1.2
+
+
 @pytest.mark.parametrize("case", RUN_INS)
 def test_the_true_model_leaves_only_noise_of_the_steady_cycles(paper_model, case):
     prepared = prepare_loop(recorded(paper_model, *RUN_INS[case]))

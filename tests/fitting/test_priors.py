@@ -9,7 +9,6 @@ from fits import joint_fit
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import ParameterSetting, RigSettings
-from bushfit.errors import BushfitError
 from bushfit.fitting.agreement import prior_uses
 from bushfit.fitting.assess import covariance
 from bushfit.fitting.prepared_campaign import PreparedCampaign
@@ -83,27 +82,3 @@ def test_tests_contradict_a_wrong_prior_and_no_right_one(rig, paper_model):
     for shift, contradicts in ((0.5, False), (-6.0, True), (6.0, True)):
         found = _fitted(rig(4), alpha=ParameterSetting(prior=f"{truth + 0.004 * shift} +- 0.004"))
         assert any(warning.kind == "prior_contradicted" for warning in found.warnings) == contradicts
-
-
-@pytest.mark.parametrize(
-    ("setting", "message"),
-    [
-        *(({"prior": text}, "this is not a prior") for text in ("0.24", "0.24 +- 0", "5 +- 0.1")),
-        ({"prior": "0.2 MPa +- 0.1 MPa"}, "unit"),
-        ({"prior": "none.json"}, "none.json: there is no such file"),
-        ({"prior": "0.2 +- 0.1", "vary": False}, "exclude each other"),
-        ({"equal": "mu", "value": 0.2}, "exclude each other"),
-        ({"equal": "alfa"}, "unknown key"),
-        ({"equal": "alpha"}, "in a circle"),
-        ({"expression": "mu.__class__"}, "unknown key"),
-        ({"expression": "1j * mu"}, "fit.alpha: this expression has no value"),
-        *(
-            ({"expression": text}, "has no value")
-            for text in ("(mu).real", "__import__(1)", "9**9**9**9", "mu; mu", "mu // 2", "2 *")
-        ),
-    ],
-)
-def test_what_is_no_tie_or_prior_is_one_clear_error(rig, setting, message):
-    with pytest.raises(BushfitError) as error:
-        _fitted(rig(0), alpha=ParameterSetting(**setting))
-    assert message in str(error.value)
