@@ -60,7 +60,9 @@ def causes_text(candidates: Sequence[Composition], finding: Finding) -> list[str
         return [f"check first whether {' or whether '.join(claim.sentence for claim in claims.values() if claim)}"]
     leads = [name for name in finding.leads if not any(name in candidate.causes for candidate in candidates)]
     if leads:
-        return [f"{join_names(leads)} would reduce the gap, but not close it"]
+        friction = any(get_effect(name).is_friction for name in leads)
+        law = "the friction law of the model does not hold for this rubber: " if friction else ""
+        return [f"{law}{join_names(leads)} would reduce the gap, but not close it"]
     return [] if candidates else ["no known effect explains the gap"]
 
 

@@ -186,14 +186,15 @@ def _leads(pairs: Sequence[tuple[Hypothesis, float]]) -> tuple[str, ...]:
         pairs: hypotheses and their posterior probabilities, the most probable first.
 
     Returns:
-        Names; empty if there is no such effect.
+        Names; empty if there is no such effect. Laws of friction resemble each other, so one stands for all of them.
     """
+    laws = {name: "friction" if get_effect(name).is_friction else name for pair in pairs for name in pair[0].effects}
     share: dict[str, float] = defaultdict(float)
     for hypothesis, weight in pairs:
-        for name in hypothesis.effects:
-            share[name] += weight
+        for law in {laws[name] for name in hypothesis.effects}:
+            share[law] += weight
     total = sum(weight for _, weight in pairs)
-    return tuple(name for name in pairs[0][0].effects if share[name] >= LEAST_NAMED_SHARE * total)
+    return tuple(name for name in pairs[0][0].effects if share[laws[name]] >= LEAST_NAMED_SHARE * total)
 
 
 def _parts_of(hypothesis: Hypothesis) -> frozenset[_Part]:

@@ -253,6 +253,11 @@ class Effect:
         return self.name.partition(".")[2] in ("", *place.labels)
 
     @property
+    def is_friction(self) -> bool:
+        """True if the effect is a law of the filler's friction, beside that of the model or in place of it."""
+        return self.replaces == "friction" or any(parameter.scale == "strain" for parameter in self.parameters)
+
+    @property
     def amount(self) -> Parameter:
         """First parameter with a neutral value; a search for the effect varies this parameter."""
         return next(parameter for parameter in self.parameters if parameter.neutral is not None)
