@@ -23,15 +23,17 @@ class Evidence:
         log_evidence: natural log of the marginal likelihood of the tests with the explanation, averaged over the sizes
             of its amounts and of the rig's errors.
         size: largest relative change of |K| due to the explanation, root mean square over the posterior.
-        likeliest: most probable of seven prior standard deviations, 0.4 to 40 % of |K|, of the explanation's amounts.
+        likeliest: most probable of seven prior standard deviations, 0.4 to 400 % of |K|, of the explanation's amounts.
         with_compound: evidence for the explanation together with a smooth deviation of the rubber from the model's
             laws; None if no such deviation is considered.
+        share: posterior probability of the likeliest standard deviation.
     """
 
     log_evidence: float
     size: float
     likeliest: float
     with_compound: Evidence | None = None
+    share: float = 1.0
 
     @property
     def total(self) -> float:
@@ -50,7 +52,7 @@ def posterior(gram: Array, projections: Array) -> tuple[Array, Array, Array, Arr
         projections: inner products U^T P r of the columns with the residuals, (..., width).
 
     Returns:
-        For normal amounts of each standard deviation in `priors.SIZES`, 0.4 to 40 % of |K|: increase of the log
+        For normal amounts of each standard deviation in `priors.SIZES`, 0.4 to 400 % of |K|: increase of the log
         evidence by the columns, (..., sizes); mean amounts, (..., sizes, width); variances along the eigenvectors of
         `gram`, (..., sizes, width). Then these eigenvectors, (..., width, width).
     """
@@ -77,7 +79,7 @@ def largest_gain(gram: Array, projections: Array) -> Array:
         projections: inner products U^T P r with the residuals, (..., width).
 
     Returns:
-        Largest increase over the standard deviations in `priors.SIZES`, 0.4 to 40 % of |K|, (...).
+        Largest increase over the standard deviations in `priors.SIZES`, 0.4 to 400 % of |K|, (...).
 
     Notes:
         The last row of the Cholesky factor of [[1 + v^2 U^T P U, v U^T P r], [., c]] has the squared norm v^2 r^T P U
@@ -132,7 +134,7 @@ def mean_evidence(signatures: Array, log_evidence: Array, changes: Array) -> dic
     by_size = np.add.reduceat(share.sum(axis=0), first, axis=0)
     total = np.maximum(by_size.sum(axis=1), np.finfo(float).tiny)
     squares = np.add.reduceat(np.sum(share * changes, axis=(0, 2)), first) / total
-    likeliest = SIZES[np.argmax(by_size, axis=1)]
-    values = (highest + np.log(total / (blocks * SIZES.size)), np.sqrt(squares), likeliest)
-    triples = zip(*(value.tolist() for value in values), strict=True)
-    return {n: Evidence(*triple) for n, triple in zip(signatures[first].tolist(), triples, strict=True)}
+    likeliest, share = SIZES[np.argmax(by_size, axis=1)], by_size.max(axis=1) / total
+    values = (highest + np.log(total / (blocks * SIZES.size)), np.sqrt(squares), likeliest, share)
+    rows = zip(signatures[first].tolist(), *(value.tolist() for value in values), strict=True)
+    return {n: Evidence(log, size, likely, share=of_all) for n, log, size, likely, of_all in rows}

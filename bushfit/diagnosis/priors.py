@@ -6,10 +6,9 @@ import numpy as np
 #: Causes are independent, so the odds of several multiply, and nothing is missing with the probability e^-0.5 = 0.61
 #: (Poisson). For most other campaigns the library has the missing effect.
 ODDS = {"effect": 0.22, "part": 0.15, "record": 0.03, "unnamed": 0.10}
-#: Sizes of missing effects and faults, relative to |K|, of equal prior probability: from invisible to obvious.
-SIZES = np.geomspace(0.004, 0.4, 7)
-#: Largest relative change of |K| by a refitted effect: some effects make a bushing several times as stiff.
-LARGEST = 4.0
+#: Sizes of missing effects and faults, relative to |K|, of equal prior probability: from invisible to several times |K|
+#: (a stop). They are the widths of normal distributions, whose mean is log-uniform within 4 %.
+SIZES = np.geomspace(0.004, 4.0, 7)
 #: Sizes of errors of the rig in units of its class, with their prior weights: errors that a run shares, ...
 RUNS = ((0.15, 0.2), (0.5, 0.3), (1.0, 0.25), (2.0, 0.2), (4.0, 0.05))
 #: ... errors that all runs of a level share, and errors of each loop, ...

@@ -23,7 +23,7 @@ from bushfit.diagnosis.explanations import Explanation
 from bushfit.diagnosis.faulty_parts import FaultyPart, OutlierCluster
 from bushfit.diagnosis.fits import fit_rivals, start_rivals
 from bushfit.diagnosis.hypotheses import Hypothesis, SearchState
-from bushfit.diagnosis.priors import BEAM, DOES_NOT_FIT, LOG_ODDS_CUTOFF, NAMED, ODDS, REFITS, ROUNDS
+from bushfit.diagnosis.priors import BEAM, DOES_NOT_FIT, LOG_ODDS_CUTOFF, NAMED, ODDS, REFITS, ROUNDS, SIZES
 from bushfit.diagnosis.projected_columns import SignatureSet
 from bushfit.diagnosis.propose import Proposal, has_used_parameters, proposals
 from bushfit.diagnosis.record import DiagnosisSettings
@@ -301,7 +301,7 @@ class Search:
             grown = replace(
                 state,
                 faulty_parts=(*state.faulty_parts, replace(part, amount=evidence.likeliest)),
-                log_prior=state.log_prior + log_odds,
+                log_prior=state.log_prior + log_odds - log(SIZES.size * evidence.share),  # stands for all sizes
                 change=max(state.change, evidence.size),
             )
             if is_bent:

@@ -275,9 +275,10 @@ def log_likelihood(solution: FitResult, prior_precision: Mapping[str, float]) ->
         shares = columns[best] * SIZES[likelihoods[best].gains(SIZES).argmax()]
         across = shares @ tests.project(tests.free_jacobian).T
         information = information - across.T @ np.linalg.solve(shares @ shares.T + np.eye(len(shares)), across)
-    information = information + np.diag([prior_precision.get(solution.names[i], 0.0) for i in solution.inner_indices])
+    precision = np.array([prior_precision.get(solution.names[i], 0.0) for i in solution.inner_indices])
+    information = information + np.diag(precision)
     log_size = sum(np.log1p(np.square(x.shared_errors.deviations)).sum() for x in split_by_kind(tests.data_sets)[0])
-    log_size += float(np.linalg.slogdet(information)[1])
+    log_size += float(np.linalg.slogdet(information)[1] - np.log(precision[precision > 0.0]).sum())
     for prior in solution.model.constraints.priors:
         names = [name for name in prior.names if name in solution.names]
         covariance = prior_covariance(prior, Coordinates.of_parameters(solution.model, names))

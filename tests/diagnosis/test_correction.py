@@ -25,7 +25,7 @@ from bushfit.effects.contract import Array, Level
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.problem import FitResult
 from bushfit.fitting.starts import start_values
-from bushfit.geometry import Direction
+from bushfit.geometry import Direction, unit_strain
 from bushfit.model.file import from_document, to_document
 from bushfit.model.model import Model
 from bushfit.model.result import Range, Result
@@ -41,10 +41,11 @@ Added = Callable[[Array, Array, Array], Array]
 
 
 def with_relaxation(campaign: Campaign, size: float = 0.06) -> Campaign:
-    """A relaxation in parallel whose time grows with amplitude, a share of the stiffness: no effect of the library."""
+    """A relaxation in parallel whose time grows with strain, a share of the stiffness: no effect of the library."""
     sweeps = []
     for sweep in campaign.sweeps:
-        turn = 2j * np.pi * sweep.frequency * 4e-3 * (sweep.amplitude / LEVELS[1]) ** 1.2
+        strain = sweep.amplitude * unit_strain(campaign.bushing, sweep.direction)
+        turn = 2j * np.pi * sweep.frequency * 4e-3 * (strain / 0.025) ** 1.2
         sweeps.append(replace(sweep, stiffness=sweep.stiffness * (1.0 + size * turn / (1.0 + turn))))
     return replace(campaign, sweeps=tuple(sweeps), loops=())
 

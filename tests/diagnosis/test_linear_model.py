@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from rigged import SHARED
 from scipy.special import logsumexp
 from scipy.stats import multivariate_normal, norm
 
@@ -12,8 +13,12 @@ from bushfit.diagnosis.explanations import Signature
 from bushfit.diagnosis.linear_model import LinearModel
 from bushfit.diagnosis.priors import SIZES
 from bushfit.diagnosis.projected_columns import CompoundDeviation, SignatureSet
+from bushfit.diagnosis.record import DiagnosisSettings
 from bushfit.diagnosis.rig_errors import Block, NoiseCase, RigErrors
+from bushfit.diagnosis.search import Search
+from bushfit.effects import get_effect
 from bushfit.effects.contract import Array
+from bushfit.fitting.prepared_campaign import PreparedCampaign
 
 #: Two errors of the rig within its class, and one of levels beyond it.
 CASES = (
@@ -110,12 +115,30 @@ def test_an_amount_is_integrated_over_its_sense(sense):
     x, weight = np.polynomial.legendre.leggauss(300)
     parameter, whole = 15.0 * x, 0.0
     for spread in spreads:
-        amounts = 7.0 * spread * (0.5 * (high - low) * x + 0.5 * (high + low))
+        reach = min(7.0 * spread, 4.0)  # beyond it the likelihood is none
+        amounts = reach * (0.5 * (high - low) * x + 0.5 * (high + low))
         shifted = of.residual + amounts[:, None, None] * column - parameter[:, None] * own
         density = noise.pdf(shifted) @ (15.0 * weight) * norm.pdf(amounts, scale=spread) * (2.0 if sense else 1.0)
-        whole += 3.5 * spread * (high - low) * weight @ density / spreads.size
+        whole += 0.5 * reach * (high - low) * weight @ density / spreads.size
     power = 0.5 * (of.residual.size - 1) * np.log(2.0 * np.pi)
     assert evidence.log_evidence == pytest.approx(np.log(whole) + power + CASES[0].log_weight, abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("name", "truth", "typical"),
+    [("inertia", 0.0, 0.05), ("inertia", 0.006, 0.05), ("inertia", 0.006, 5.0), ("viscous", 10.0, 100.0)],
+)
+def test_a_refit_gives_the_evidence_of_the_column_in_any_unit(measured, fitted, monkeypatch, name, truth, typical):
+    """The prior of an amount is counted once, and is the same in a refit of all parameters as in the linear model."""
+    amount = get_effect(name).amount
+    monkeypatch.setitem(vars(amount), "typical", typical)
+    base = fitted(campaign := measured({name: {amount.name: truth}}, SHARED))
+    search = Search(PreparedCampaign.from_campaign(campaign), base, lambda _: base, DiagnosisSettings(), {}, ())
+    (effect,) = (proposal for proposal in search.proposals if proposal.name == name)
+    (by_column,) = search.root.weigh(SignatureSet.split([effect.signature], search.root.columns.errors))
+    refitted, *_ = search._with_effects(search.root, [effect])
+    gain = refitted.log_weight - search._log_odds("effect", name) - search.root.log_weight
+    assert gain + refitted.linear.evidence.total == pytest.approx(by_column.total, abs=0.1)
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -46,12 +46,12 @@ largest_too_stiff = both(off(1, 1.1), off(1, 1.04, amplitude=LEVELS[2]))
 
 @pytest.mark.parametrize(("tamper", "level"), [(smallest_too_stiff, "0.1"), (largest_too_stiff, "0.5")])
 def test_a_level_under_one_of_two_preloads_is_measured_again(measured, tamper, level):
-    """The smallest level could be friction, the largest the softening of others after it, but a level alone is off."""
+    """The smallest level could be friction, but a level alone is off; the rubber was softened before the tests."""
     axial = [
         replace(measured(seed=seed).sweeps[0], name=f"{seed}", preload=Preload(500.0 * seed, "N")) for seed in (0, 1)
     ]
     campaign = replace(measured(), loops=(), sweeps=tuple(axial))
-    diagnosis = asked(tamper(campaign))
+    diagnosis = asked(tamper(campaign), without=("mullins_levels",))
     assert diagnosis.verdict == "unexplained"
     assert f"measure again: the axial level {level} mm at a preload of 500 N" in diagnosis.next_test
 
