@@ -45,11 +45,11 @@ def laplace(name: str, fit: FitResult, before: FitResult) -> tuple[float, dict[s
         precisions = {qualified_name(effect, parameter): uniform for parameter in effect.parameters}
         return -log(uniform), precisions, change(before.model)
     stated = {name for prior in model.constraints.priors for name in prior.names}  # their prior is in the likelihood
-    own = {qualified_name(effect, parameter): parameter for parameter in effect.parameters}
-    numbers = {name: number for number, name in enumerate(fit.names) if name in own and name not in stated}
+    parameters = {qualified_name(effect, parameter): parameter for parameter in effect.parameters}
+    numbers = {name: number for number, name in enumerate(fit.names) if name in parameters and name not in stated}
     factor, precision = 0.0, np.zeros(len(fit.names))
     for coordinate, number in numbers.items():
-        if (parameter := own[coordinate]).neutral is None:
+        if (parameter := parameters[coordinate]).neutral is None:
             ends = np.array(reach.get(coordinate, parameter.bounds))
             width = float(np.ptp(np.log(ends) if parameter.log else ends / parameter.typical))
             precision[number] = 2.0 * pi / width**2
@@ -62,7 +62,7 @@ def laplace(name: str, fit: FitResult, before: FitResult) -> tuple[float, dict[s
     variances[inner] = np.diag(np.linalg.pinv(information, rcond=1e-12, hermitian=True))
     size = change(model.without(name))
     for coordinate, number in numbers.items():
-        if (parameter := own[coordinate]).neutral is not None:
+        if (parameter := parameters[coordinate]).neutral is not None:
             reference = None if parameter is effect.amount else model.with_values({coordinate: parameter.neutral})
             of_amount = max(change(reference) if reference else size, _NEGLIGIBLE)
             distance = abs(model.values[coordinate] - parameter.neutral) / parameter.typical
