@@ -101,9 +101,7 @@ def _check_record(effect: Effect) -> None:
     for parameter in effect.parameters:
         place, (low, high) = f"{effect.name}.{parameter.name}", parameter.bounds
         assert low < parameter.value_at_share(1.0) < high, f"{place}: the typical value is not inside the bounds"
-        assert parameter.log == (parameter.neutral is None), (
-            f"{place}: log belongs to parameters without a neutral value"
-        )
+        assert parameter.log == (parameter.neutral is None), f"{place}: log is for parameters without a neutral value"
         assert low > 0.0 or not parameter.log, f"{place}: the lower bound of a logarithm is not positive"
         assert parameter.neutral is None or low <= parameter.neutral <= high, f"{place}: neutral value outside bounds"
 
@@ -151,9 +149,7 @@ def _check_arrays(model: Model, direction: Direction, amplitude: float, rng: np.
     turns = np.linspace(0.0, 1.0, 4)
     conditions = RubberConditions(295.0 + turns, turns, 0.1 * turns, 0.1 * turns, 0.1 - 0.1 * turns)
     together = model.stiffness(direction, frequency, amplitudes, kind="loop", values=values, conditions=conditions)
-    assert together.shape == (3, 4), (
-        "the stiffness of three sets of values at four points has another shape than (3, 4)"
-    )
+    assert together.shape == (3, 4), "the stiffness of three sets of values at four points is not of shape (3, 4)"
     for row, one in zip(together, models, strict=True):
         for point, stiffness in enumerate(row):
             at_point = conditions.select(point)

@@ -330,9 +330,7 @@ def _spell(word: re.Match[str]) -> str:
 
 def _by_pint(text: str) -> tuple[float, str]:
     """Factor to SI, and SI base unit, of a unit that pint has to parse: words, powers, products and quotients."""
-    unknown = UnitError(
-        "unknown unit", found=f'"{text[:_LONGEST_UNIT]}"', expected="a unit such as mm, N, kN/mm, deg, Hz or %"
-    )
+    unknown = UnitError("unknown unit", found=f'"{text[:_LONGEST_UNIT]}"', expected="such as mm, N, kN/mm, deg, Hz, %")
     if len(text) <= _LONGEST_UNIT:
         text = _WORD.sub(_spell, text)
         text = _POWER.sub("^", _JOINT.sub("*", _NEWTON.sub(r"\1*", text.replace("_", " "))))

@@ -250,12 +250,10 @@ def _frequencies(raw: dict[str, Any]) -> list[str]:
     """Frequencies, as texts in Hz, of a table with start, stop and step; both ends are included."""
     expected = '{ start = "5 Hz", stop = "155 Hz", step = "10 Hz" }, or a list such as ["5 Hz", "15 Hz"]'
     if set(raw) != {"start", "stop", "step"}:
-        raise CampaignError("this is not a range of frequencies", found=str(raw), expected=expected)
+        raise CampaignError("this is no range of frequencies", found=str(raw), expected=expected)
     values = regular_steps(*(parse_quantity(raw[key], "Hz") for key in ("start", "stop", "step")))
     if not values:
-        raise CampaignError(
-            "this is not a range of frequencies", found=str(raw), expected="0 < start <= stop, step > 0"
-        )
+        raise CampaignError("this is no range of frequencies", found=str(raw), expected="0 < start <= stop, step > 0")
     return [f"{value!r} Hz" for value in values]
 
 

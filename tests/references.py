@@ -27,7 +27,7 @@ DATA_LINE = re.compile(r"(?!\|)(.+?) = ([-+.\de ]+?)(?: \((\d+ of \d+) values, m
 #: Keys, columns and texts that differ from run to run or from release to release.
 CHANGING = re.compile(r"seconds|key|inputs|version|sha256|provenance")
 CHANGING_TEXT = re.compile(
-    r'bushfit \d+\.\d+\.\d+.*| time="[\d.]+"|; [\d.]+ s, [\d.]+ per second|\b(?=\d*[a-f])[0-9a-f]{12,}\b'
+    r'bushfit \d+\.\d+\.\d+.*| time="[\d.]+"|(?<=with an error), in [\d.]+ s|\b(?=\d*[a-f])[0-9a-f]{12,}\b'
 )
 #: Relative tolerances of printed numbers, of data, and of data that are errors, derivatives or small differences.
 PRINTED, DATA, DERIVED = 0.02, 1e-3, 0.02

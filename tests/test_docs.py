@@ -72,8 +72,8 @@ def test_the_campaign_reference_is_valid_and_has_every_key(root):
         reference = tomllib.loads(page)
         TypeAdapter(CampaignFile).validate_python(reference)
         written |= keys_written(reference)
-    # [fit.mu] and the like stand for parameters; a size is a radius or a diameter
-    assert keys(CampaignFile) - written <= {"parameters", "inner_diameter", "outer_diameter"}
+    # [fit.mu] and the like stand for parameters; a size is a radius or a diameter; an operating point is a text
+    assert keys(CampaignFile) - written <= {"parameters", "inner_diameter", "outer_diameter", "place", "unit"}
 
 
 def test_manifest_and_limits_are_valid_and_have_every_key(root):

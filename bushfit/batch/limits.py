@@ -6,8 +6,9 @@ Notes:
     A value with its 95 % interval meets a limit in one of four ways, named as in ILAC-G8:09/2019, statements of
     conformity. Pass: the whole interval is within the limits. Conditional pass: the value is within the limits, but not
     the whole interval. Conditional fail: the value is outside, but a part of the interval is within. Fail: the whole
-    interval is outside. An unknown quantity fails. A parameter at a bound of its fit is a conditional pass at best,
-    because the tests do not determine it. If the model misses the tests, the measured points are compared with the
+    interval is outside. An unknown quantity fails. A value that the tests do not determine (half of the interval is as
+    large as the value) is not judged if the interval contains a limit. A parameter at a bound of its fit is a
+    conditional pass at best. If the model misses the tests, the measured points are compared with the
     limits; a limit without a measured point is not judged.
 """
 
@@ -30,7 +31,6 @@ from bushfit.batch.quantities import (
     LOSS_FACTOR,
     STIFFNESS,
     PartQuantity,
-    PointText,
 )
 from bushfit.campaign.quantities import convert_limits
 from bushfit.campaign.toml import parse_toml
@@ -39,6 +39,7 @@ from bushfit.diagnosis import document
 from bushfit.effects.contract import Array
 from bushfit.errors import CampaignError
 from bushfit.fitting.model_error import BEYOND_NOISE
+from bushfit.geometry.point import PointText
 from bushfit.reduction.arrays import median_and_scatter
 from bushfit.report.batch_document import LimitResult
 from bushfit.units import number, parse_quantity
@@ -293,7 +294,8 @@ def judge_quantity(
         bound: bound of the fit, "min" or "max", that the parameter reached; None if it reached neither.
 
     Returns:
-        Result, which is a conditional pass at best if the parameter reached a bound; and a sentence in the display unit
+        Result, which is "not judged" if the interval contains a limit and is as wide as twice the value, and a
+        conditional pass at best if the parameter reached a bound; and a sentence in the display unit
         of the value, with the nearer limit: "alpha 0.26 (0.25 to 0.27), limit 0.252: conditional fail".
     """
     low, high = allowed
@@ -305,10 +307,13 @@ def judge_quantity(
     ends = [number(end * displayed.factor, 4) for end in (estimate.low, estimate.high) if end is not None]
     finite = [limit for limit in allowed if math.isfinite(limit)]
     unit = f" {displayed.unit}" if displayed.unit != "-" else ""
+    if result.startswith("conditional") and upper - lower >= 2.0 * abs(estimate.value):
+        interval = f"95 % interval {' to '.join(ends)}{unit}"
+        return "not judged", f"the tests do not determine {quantity.name} ({interval})"
     sentence = f"{quantity.name} {number(estimate.value * displayed.factor, 4)}{unit}"
     sentence += f" ({' to '.join(ends)})" if len(ends) == 2 else ""
     if finite:
         nearest = min(finite, key=lambda limit: abs(limit - estimate.value))
         sentence += f", limit {number(nearest * displayed.factor, 4)}{unit}"
-    sentence += f", not determined ({bound} bound of the fit)" if bound else ""
+    sentence += f", the {bound}imum that the fit allows, because the tests do not determine it" if bound else ""
     return result, sentence + (f": {result}" if result.startswith("conditional") else "")

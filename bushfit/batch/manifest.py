@@ -16,11 +16,11 @@ from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, ConfigDict, Field
 
-from bushfit.batch.quantities import Point, PointText
 from bushfit.campaign.toml import parse_toml
 from bushfit.effects import Effect, get_effect
 from bushfit.effects.mistakes import get_candidate
 from bushfit.errors import CampaignError, error_location
+from bushfit.geometry.point import Point, PointText
 from bushfit.reading.files import read_utf8
 from bushfit.reading.tablefile import folder_name
 from bushfit.validation import Frequency, Share, Text, converter, unknown_key, validate_tables
@@ -368,9 +368,7 @@ def complete_settings(row_settings: RowSettings, defaults: RowSettings, base: Pa
     refuse_unused_settings(row_settings, [commands], source)
     if {*commands} <= {"predict", "respond"} and not settings.model:
         expected = f'commands = ["fit", "{commands[0]}"], or model = "model.json"'
-        raise CampaignError(
-            f"{commands[0]} has no model to predict from", file=source, place="commands", expected=expected
-        )
+        raise CampaignError(f"{commands[0]} has no model", file=source, place="commands", expected=expected)
     if "respond" in commands and not settings.history:
         expected = 'history = "road.csv"'
         raise CampaignError("respond has no displacement history", file=source, place="history", expected=expected)

@@ -15,13 +15,14 @@ import numpy as np
 from bushfit.batch import store
 from bushfit.batch.document import ROW_SCHEMA, Estimate, RowFile
 from bushfit.batch.manifest import Row, RowSettings
-from bushfit.batch.quantities import FIT_QUALITY, LOSS_FACTOR, STIFFNESS, Point, measured_at, measured_curve
+from bushfit.batch.quantities import FIT_QUALITY, LOSS_FACTOR, STIFFNESS, measured_at, measured_curve
 from bushfit.campaign.campaign import Campaign, load_campaign
 from bushfit.caveat import Caveat, to_entries
 from bushfit.effects import get_effect
 from bushfit.errors import BatchError, BushfitError, ModelError
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.geometry import get_places
+from bushfit.geometry.point import Point
 from bushfit.model.file import load_result
 from bushfit.model.result import Result
 from bushfit.prediction.caveats import warnings_of

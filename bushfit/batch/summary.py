@@ -22,7 +22,6 @@ from bushfit.batch.quantities import (
     STIFFNESS,
     PartQuantity,
     list_quantities,
-    parse_point,
     point_quantity,
 )
 from bushfit.batch.row import RowTask
@@ -32,6 +31,7 @@ from bushfit.effects import is_parameter
 from bushfit.effects.contract import Array
 from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.fitting.model_error import BEYOND_NOISE
+from bushfit.geometry.point import parse_point
 from bushfit.model.covariance import Z95
 from bushfit.reduction.arrays import median_and_scatter
 from bushfit.report.batch_document import BatchFile, PartTable, QuantityTable
@@ -160,7 +160,7 @@ class BatchResult:
             headline = f"{len(missed)} of {total} fail{'s' * (len(missed) == 1)}"
         else:
             headline = f"{len(parts) - len(failed) - len(not_judged)} of {total} pass"
-        headline += f"; {len(not_judged)} not judged: poor fit" if not_judged else ""
+        headline += f"; {len(not_judged)} not judged" if not_judged else ""
         headline += f"; {len(failed)} could not be evaluated" if failed else ""
         headline += f"; {len(differ)} differ{'s' * (len(differ) == 1)} from the others" if differ else ""
         return BatchFile(
@@ -298,12 +298,12 @@ class BatchResult:
             sentence = f"the tests of {listed(missing)} deviate from the model by more than noise explains"
             warnings.append(Caveat("part_misfit", f"{sentence}: --command diagnose looks for the cause"))
         if lacking := [part.name for part, lacks in zip(parts, self.lacks_sweep, strict=True) if lacks]:
-            sentence = f"no sweep, unlike the other parts, and so not compared with them: {listed(lacking)}"
+            sentence = f"not compared with the other parts, because a sweep is missing: {listed(lacking)}"
             warnings.append(Caveat("part_without_sweep", sentence))
         warnings += self._notes
         if at_bound:
             clauses = [f"{parameter} of {listed(names)}" for parameter, names in at_bound.items()]
-            sentence = f"at a bound of the fit, because the tests do not determine them: {'; '.join(clauses)}"
+            sentence = f"the tests do not determine {'; '.join(clauses)}: the fit ends at a bound"
             warnings.append(Caveat("part_at_bound", sentence))
         if outside := [part.name for part in parts if not _EXTRAPOLATIONS.isdisjoint(part.warning_kinds)]:
             sentence = "a point is outside the tested range, where no test confirms the model"

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field
 
-from bushfit.errors import CampaignError
+from bushfit.errors import CampaignError, ModelError
 from bushfit.geometry import Bushing, CouponKind, Direction, Shape, Specimen, StatedStrain
 from bushfit.validation import Count, Length, Name, si
 
@@ -56,12 +56,27 @@ class BushingSettings:
                 raise ValueError(CampaignError(problem, place=f"{side}_radius", expected=expected))
 
     def to_bushing(self) -> Bushing:
-        """Make the bushing that the table [bushing] describes; diameters are converted to radii."""
+        """Make the bushing that the table [bushing] describes.
+
+        Returns:
+            The bushing; diameters are converted to radii.
+
+        Raises:
+            ModelError: impossible sizes; the error states radii or diameters, as the table does.
+        """
         radii = {
             f"{side}_radius": getattr(self, f"{side}_radius") or getattr(self, f"{side}_diameter") / 2.0
             for side in ("inner", "outer")
         }
-        return Bushing(self.name, length=self.length, shape=self.shape, **radii)
+        try:
+            return Bushing(self.name, length=self.length, shape=self.shape, **radii)
+        except ModelError as error:
+            keys = (error.place or "").split(", ")
+            table_keys = [key if getattr(self, key) else key.replace("radius", "diameter") for key in keys]
+            if table_keys != keys:
+                error.place, error.hint = ", ".join(table_keys), "check that inner and outer are not swapped"
+                error.found = " and ".join(f"{1e3 * getattr(self, key):g} mm" for key in table_keys)
+            raise
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ from bushfit.campaign.quantities import Compound, EffectsSettings, ReportSetting
 from bushfit.campaign.schema import CampaignFile, FitSettings, ParameterSetting, PredictSettings, RigSettings
 from bushfit.campaign.simulated import SimulateSettings
 from bushfit.campaign.toml import parse_toml
+from bushfit.caveat import join_names
 from bushfit.effects import effect_name_of, place_suffix, with_base
 from bushfit.errors import CampaignError, error_location, quote_path
 from bushfit.geometry import Bushing, Direction, Place, Specimen, get_places
@@ -121,7 +122,7 @@ def load_campaign(path: str | Path) -> Campaign:
     all_sweeps = [read_sweep(**keywords) for keywords in sweeps]
     tests: list[Loop | Sweep] = [*all_loops, *all_sweeps]
     units = {test.direction: test.preload.unit for test in tests if test.preload and test.preload.value}
-    several = " and ".join(table.name for table in content.bushings)
+    several = join_names(table.name for table in content.bushings)
     contents: dict[str, Any] = {
         "name": content.name or (bushing.name if bushing else several or specimens[0].body),
         "bushing": bushing,
@@ -194,10 +195,13 @@ def _check_bodies(content: CampaignFile) -> None:
 
 
 def _check_places(content: CampaignFile, specimens: Sequence[Specimen]) -> None:
-    """Raise a CampaignError for unknown directions or specimens in [predict], [fit] and [simulate]."""
+    """Raise a CampaignError for unknown directions or specimens in [predict], [report], [fit] and [simulate]."""
     with error_location(place="predict.directions"):
         for name in content.predict.directions or ():
             get_places(name, specimens)
+    with error_location(place="report.operating_points"):
+        for point in content.report.operating_points:
+            get_places(point.place, specimens)
     simulated = content.simulate.effect_parameters if content.simulate else {}
     for name in (*content.fit.effects, *content.fit.parameters, *simulated):
         if place := place_suffix(name):

@@ -146,7 +146,5 @@ def _ties(campaign: Campaign) -> list[Tie]:
     except CycleError as error:
         circle = ", ".join(f"{name} = {ties[name].expression}" for name in error.args[1][:0:-1])
         expected = "one that is free"
-        raise CampaignError(
-            "these parameters are tied in a circle", place="fit", found=circle, expected=expected
-        ) from None
+        raise CampaignError("parameters are tied in a circle", place="fit", found=circle, expected=expected) from None
     return [ties[name] for name in order]

@@ -12,6 +12,7 @@ from pydantic import BeforeValidator
 
 from bushfit.effects import get_parameter, is_parameter, library_parameters
 from bushfit.errors import CampaignError, UnitError, error_location
+from bushfit.geometry.point import PointText
 from bushfit.reading.files import view_bytes
 from bushfit.units import check_size, parse_quantity
 from bushfit.validation import LARGEST_NUMBER, Name, converter, text, unknown_key
@@ -107,9 +108,7 @@ def parameter_settings(raw: dict[str, Any]) -> dict[str, Any]:
             ends = np.clip([table.get("min", low), table.get("max", high)], low, high)
             if ordered != sorted(ordered) or ends[0] == ends[1]:
                 expected = f"min below max within {low:g} to {high:g} {parameter.unit}, and value between them"
-                raise CampaignError(
-                    "no value is within these limits", place=name, found=str(raw[name]), expected=expected
-                )
+                raise CampaignError("no value meets these limits", place=name, found=str(raw[name]), expected=expected)
             table |= {key: float(end) for key, end in zip(("min", "max"), ends, strict=True) if key in table}
     return settings
 
@@ -166,7 +165,7 @@ class EffectsSettings:
 
 @dataclass(frozen=True)
 class ReportSettings:
-    """[report]: texts and logo in the head of the report.
+    """[report]: texts and logo in the head of the report, and the operating points of its result.
 
     Args:
         customer: customer of the part.
@@ -176,6 +175,7 @@ class ReportSettings:
         laboratory: laboratory that tested the part.
         date: date of the report.
         logo: PNG or SVG file, relative to the campaign file.
+        operating_points: points of the result table, such as "axial 15 Hz 0.5 mm"; empty for the middle of the tests.
     """
 
     customer: Name | None = None
@@ -185,11 +185,13 @@ class ReportSettings:
     laboratory: Name | None = None
     date: Name | None = None
     logo: Name | None = None
+    operating_points: tuple[PointText, ...] = ()
 
     @property
     def lines(self) -> dict[str, str]:
-        """Texts for the head of the report by key, such as "customer", in order; without the logo and missing texts."""
-        return {key: value for key, value in vars(self).items() if value is not None and key != "logo"}
+        """Texts of the report by key, such as "customer", in order; without the logo and missing texts."""
+        texts = vars(self) | {"logo": None, "operating_points": "; ".join(map(str, self.operating_points))}
+        return {key: value for key, value in texts.items() if value}
 
 
 def embed_logo(file: Path) -> str:

@@ -82,11 +82,11 @@ def command(
     workers = local_workers(jobs) if scheduler is None else dask_workers(scheduler, warn)
     from bushfit.batch.limits import read_limits
     from bushfit.batch.manifest import RowSettings, read_manifest
-    from bushfit.batch.quantities import parse_point
     from bushfit.batch.row import RowTask
     from bushfit.batch.run import check_output, run_batch
     from bushfit.batch.summary import BatchPlan
     from bushfit.effects import get_effect
+    from bushfit.geometry.point import parse_point
 
     with error_location(place="--effect"):
         options["effects"] = tuple(get_effect(name).name for name in options["effects"])
@@ -119,7 +119,9 @@ def _print_result(output: Output, result: BatchResult, folder: Path) -> None:
     sentences = {
         "fail": [f"{part.name} fails: {'; '.join(part.misses.values())}" for part in parts if part.misses],
         "are not judged": [
-            f"{part.name} is not judged: {part.poor_fit}" for part in parts if part.result == "not judged"
+            f"{part.name} is not judged: {part.poor_fit or '; '.join(part.doubtful.values())}"
+            for part in parts
+            if part.result == "not judged"
         ],
         "could not be evaluated": [f"{part.name} could not be evaluated: {part.error}" for part in parts if part.error],
         "differ": [f"{part.name} differs from the others: {part.differs}" for part in parts if part.differs],
@@ -147,11 +149,8 @@ def _print_result(output: Output, result: BatchResult, folder: Path) -> None:
         counted = f"{document.title}: {document.done} bushing{'s' * (document.done > 1)}"
         output.print_table(counted, columns[:column_count], [row[:column_count] for row in rows])
     from_before = f", {result.kept_count} of them from an earlier run" if result.kept_count else ""
-    rate = len(parts) / max(result.seconds, 1e-9)
-    output.print(
-        f"{document.done} evaluated{from_before}, {len(document.failed)} with an error; {result.seconds:.1f} s, "
-        f"{rate:.1f} per second"
-    )
+    errors = f"{len(document.failed)} with an error"
+    output.print(f"{document.done} evaluated{from_before}, {errors}, in {result.seconds:.1f} s")
     if document.limits:
         counts = ", ".join(f"{count} {word}" for word, count in document.limits.items())
         explanation = " (conditional: the 95 % interval crosses the limit)" if "conditional" in counts else ""

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from bushfit.caveat import join_names
 from bushfit.cli.options import FILE, command_called, direction_option, option, option_group
 from bushfit.cli.output import Output, with_output
 from bushfit.cli.shared_options import grid_options
@@ -74,7 +75,7 @@ def command(sources: tuple[Path, ...], families: str | None, output: Output, **s
             loaded = load_source(source)
             digest = None if isinstance(loaded, Campaign) else model_source(model_file(source)).sha256
             entries.append(compared_result(loaded, str(source), digest, settings["directions"]))
-    name = " and ".join(entry.name for entry in entries)
+    name = join_names(entry.name for entry in entries)
     folder = output.folder(name, "compare.json")
     compared = compare(*entries, **settings)
     _print_comparison(output, name, compared)
@@ -98,8 +99,13 @@ def _print_comparison(output: Output, name: str, compared: ComparisonOutput) -> 
         sentences = [*advice, *notes, *(compared.words if output.verbose else ())]
     else:
         differing = zip(labels, (comparison.differing for comparison in compared.comparisons), strict=True)
-        different = [f"{label} differs from {first} in {', '.join(names)}" for label, names in differing if names]
-        verdict = f"{'; '.join(different)}: more than chance explains"
+        called = {entry.label: f"{entry.label} ({entry.name})" for entry in content.compared}
+        different = [
+            f"{called[label]} differs from {called[first]} in {join_names(names)}"
+            for label, names in differing
+            if names
+        ]
+        verdict = f"{'; '.join(different)}, by more than chance"
         action = "do not exchange the results; differences.csv lists stiffness and loss factor at each point"
         if not different:
             verdict = f"no stiffness, loss factor or parameter differs from that of {first} by more than chance"

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from bushfit.diagnosis.document import EffectEntry
 
 #: Title of the regions in which model and tests disagree.
-_WHERE = "where (x noise: rms of the smooth part of the gap, in units of its own standard error)"
+_WHERE = "where (size of the smooth part of the gap, in standard errors σ)"
 #: Terminal colours of the verdicts.
 _COLOURS = {"consistent": "green", "named": "green", "unexplained": "red"}
 
@@ -136,7 +136,7 @@ def print_findings(output: Output, diagnosed: DiagnosisOutput) -> None:
         if regions and not (title == "what remains" and diagnosis.remainder == diagnosis.where):
             console.print(f"  [bold]{title}[/bold]")
             for region in regions:
-                console.print(f"    {number(region.excess, 2):>5} x noise: {escape(region.reading)}")
+                console.print(f"    {number(region.excess, 2):>5} σ: {escape(region.reading)}")
     if diagnosis.next_test:
         console.print(f"  [bold]next test:[/bold] {escape(diagnosis.next_test)}")
     if diagnosed.rivals:
@@ -171,6 +171,7 @@ def _print_effect(output: Output, effect: EffectEntry, *, in_model: bool) -> Non
     title = f"[bold]{effect_label(effect['name'])}[/bold]{escape(test)}"
     console.print(f"  {title} ({level}): {escape(effect['sentence'])}")
     for parameter, value, interval in () if in_model else effect_sizes(effect):
-        console.print(f"    {parameter} = {value}, {f'95 % {interval}' if interval else 'no interval'}")
+        error = f"95 % {interval}" if interval else "error not known: do not quote this value"
+        console.print(f"    {parameter} = {value}, {error}")
     if effect["correction"]:
         console.print(f"    correction in the campaign: {escape(effect['correction'])}")

@@ -114,8 +114,6 @@ def command(model: Path, formats: tuple[str, ...], campaign: Path | None, output
     for limit in printed:
         output.print(f"limit of {', '.join(limits[limit])}: {limit}")
     if remaining := len(limits) - len(printed):
-        output.print(
-            f"{remaining} more limit{'s' * (remaining > 1)} of the formats: -v prints all; the files state them"
-        )
+        output.print(f"{remaining} more limit{'s' * (remaining > 1)} of the formats: see -v or the files")
     output.warn(warnings)
     output.write(folder, files, document, input_files(loaded, file))

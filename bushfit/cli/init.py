@@ -60,7 +60,8 @@ def command(files: tuple[Path, ...], name: str | None, no_input: bool, output: O
 
     A campaign is a text file of a bushing and its tests. FILE is a test file, a workbook or a folder. In a terminal,
     init asks for missing information. An option applies to all files. Writes campaign.toml, or the file given by
-    -o my_bushing.toml; for several parts, a campaign each and batch.toml.
+    -o my_bushing.toml; for several parts, a campaign each and batch.toml. For several bushings of one compound, give
+    the files of one bushing, and add the others under [[bushings]] (see configs/reference.toml).
     """
     from bushfit.geometry import Specimen
     from bushfit.inspection.gathering import gather
@@ -159,11 +160,7 @@ def make_bushing(name: str, sizes: Mapping[str, str | None]) -> tuple[Bushing, d
     try:
         bushing = validate_tables({"name": name, **texts}, None, BushingSettings).to_bushing()
     except BushfitError as error:
-        keys = (error.place or "").split(", ")
-        names = [key if key in texts else key.replace("radius", "diameter") for key in keys]
-        error.file, error.place = None, ", ".join(map(option_name, names)) if error.place else None
-        if names != keys:
-            error.hint = "a diameter is halved; check that inner and outer are not swapped"
+        error.file, error.place = None, error.place and ", ".join(map(option_name, error.place.split(", ")))
         raise
     return bushing, texts | ({"shape": "calibrated"} if bushing.correction is not None else {})
 
@@ -260,7 +257,7 @@ def inspect_source(
         raise direction_error(source.file, source.sheet)
     if is_asking and inspection.amplitude_convention_unknown:
         raise MeasurementError(
-            "the headers do not state how amplitudes are counted", file=source.file, hint="--amplitude"
+            "the file does not state how amplitudes are counted", file=source.file, hint="--amplitude"
         )
     if is_asking and "preload" not in {*inspection.entry, *test_options}:
         raise MeasurementError("the preload of this test is not stated", file=source.file, hint="--preload")

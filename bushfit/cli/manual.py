@@ -21,6 +21,7 @@ def command(page: str | None, output: Output) -> None:
     Writes manual.html.
     """
     import tempfile
+    import webbrowser
 
     from bushfit.errors import unknown_name
     from bushfit.report.page.manual import manual_page, page_names
@@ -33,4 +34,4 @@ def command(page: str | None, output: Output) -> None:
     file = (folder / "manual.html").resolve()
     output.write(folder, [ResultFile("manual", "page", manual_page)], {"file": str(file), "pages": names})
     if output.output is None:
-        click.launch(f"{file.as_uri()}#{page}" if page else file.as_uri())
+        webbrowser.open(f"{file.as_uri()}#{page}" if page else file.as_uri())

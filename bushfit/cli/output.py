@@ -169,9 +169,7 @@ class Output:
             if warning.consequence != GENERAL:
                 messages.print(f"  {warning.consequence}", markup=False)
         if remaining := len(warnings) - len(printed):
-            messages.print(
-                f"{remaining} more warning{'s' * (remaining > 1)}: -v prints all; the result files contain them"
-            )
+            messages.print(f"{remaining} more warning{'s' * (remaining > 1)}: see -v or the result files")
         self._warnings.clear()
 
     def print_table(

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from bushfit.caveat import to_caveats
+from bushfit.caveat import join_names, to_caveats
 from bushfit.cli.options import FILE, command_called, direction_option, file_option, option, option_group
 from bushfit.cli.output import Output, with_output
 from bushfit.cli.shared_options import grid_options, number_up_to, quantity
@@ -125,10 +125,9 @@ def _print_plan(output: Output, plan: Plan) -> None:
     runs = f"{len(document['tests'])} runs in {hours} h"
     if rivals := document["rivals"]:
         chi_square, standard = (number(rivals[key], 3) for key in ("planned", "standard"))
-        output.print(
-            f"{runs}: expected chi-square between {' and '.join(rivals['effects'])} {chi_square}, with the standard "
-            f"programme {standard}; {number(rivals['enough'], 3)} distinguishes them in nine of ten cases"
-        )
+        output.print(f"{runs} to distinguish {join_names(rivals['effects'])}: expected chi-square {chi_square}")
+        enough = number(rivals["enough"], 3)
+        output.print(f"  {enough} is enough in nine of ten cases; the standard programme reaches {standard}")
     else:
         if "plan_model_error" in document["warning_kinds"]:
             output.print("diagnose first, and plan from its model.json: no test reduces the error of the present model")

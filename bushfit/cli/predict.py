@@ -183,6 +183,7 @@ def print_predictions(output: Output, predicted: PredictionOutput) -> None:
                 value, *limits = format_aligned([row[name], *band], digits)
                 cells.append(f"{value} ({' to '.join(limits)})" if band[0] < band[1] else value)
             rows.append(cells)
-        title = f"{owner}{prediction.label}, first and last frequency, with 95 % bands"
+        bands = ", with 95 % bands" if predicted.result.measured else ""
+        title = f"{owner}{prediction.label}, first and last frequency{bands}"
         output.print_table(title, list(table.columns[:4]), rows, text_columns=0)
     output.warn(predicted.warnings)

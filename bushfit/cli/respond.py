@@ -56,9 +56,7 @@ def command(model: Path, history: Path, directions: tuple[str, ...], output: Out
     from bushfit.validation import validate_tables
 
     if len(directions) > 1:
-        raise click.UsageError(
-            "'--direction' takes one direction; a file with several directions states them in its headers."
-        )
+        raise click.UsageError("'--direction' takes one direction; a file with several states them in its headers.")
     result = load_model(model)
     folder = output.folder(result.name, output.formats.table("response"))
     test_options = settings.pop("test_options")

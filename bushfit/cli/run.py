@@ -71,7 +71,8 @@ def print_run(output: Output, name: str, outcome: RunOutput, action: str, again:
         print_verdict(output, diagnosed, again, action)
     else:
         output.print_headline(name, "every parameter is fixed, so there is nothing to diagnose", action)
-    print_result(output, f"{name}: {'model to use' if outcome.added else 'joint fit'}", result)
+    tests = f"the {join_names(result.measured.directions)} tests" if result.measured else "these tests"
+    print_result(output, f"{name}: {'model to use, fitted to' if outcome.added else 'joint fit of'} {tests}", result)
     if diagnosed and (output.verbose or diagnosed.diagnosis.verdict != "consistent"):
         print_findings(output, diagnosed)
     _print_range(output, outcome)

@@ -218,7 +218,7 @@ def grid(unit: str, *, static: bool = False) -> Callable[[str], Grid]:
         if not values:
             raise UnitError("start:stop:step contains no value", found=text, expected=expected, hint=hint)
         if min(values) <= 0.0:
-            raise UnitError("a frequency or amplitude is zero or negative", found=text, expected=expected, hint=hint)
+            raise UnitError("frequencies and amplitudes must be above zero", found=text, expected=expected, hint=hint)
         return values
 
     return parse

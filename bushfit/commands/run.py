@@ -42,9 +42,7 @@ class RunDocument(WarningEntries, total=False):
     static: ModelFile
     dynamic: ModelFile
     joint: ModelFile
-    model: Required[
-        Annotated[ModelFile, Field(description="Model to use: the joint fit, or the model with the effects added.")]
-    ]
+    model: Required[Annotated[ModelFile, Field(description="Model to use: the joint fit, or with added effects.")]]
     diagnosis: DiagnosisFile
 
 

@@ -177,7 +177,7 @@ def _validity_sentence(correction: Unnamed, whole: FitResult) -> str:
         for patch in correction.patches
     )
     misfit = max((region.excess for region in find_regions(whole) if region.kind == "loop"), default=0.0)
-    stays = f" ({number(misfit, 2)} x noise remain in the shape of loops)" if misfit else ""
+    stays = f" (in the shape of loops, a gap of {number(misfit, 2)} σ remains)" if misfit else ""
     loops = f"; in loops, it changes the first harmonic only{stays}" if split_by_kind(whole.data_sets)[0] else ""
     return f"no effect explains it; valid only for this bushing and between these tests ({patches}){loops}"
 

@@ -77,7 +77,13 @@ _QUANTITIES: dict[Quantity, str] = {
     "modulus": "equal as a modulus over strain",
     "gain": "equal in % of |K| in every direction",
 }
-_QUARTERS = {0: "more stiffness", 90: "more loss", 180: "less stiffness", -180: "less stiffness", -90: "less loss"}
+_QUARTERS = {
+    0: "adds stiffness",
+    90: "adds loss",
+    180: "lowers stiffness",
+    -180: "lowers stiffness",
+    -90: "lowers loss",
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,28 +118,27 @@ class PowerLaw:
 
     @property
     def sentence(self) -> str:
-        """Text on the power law, such as "acts like a damper: more loss, grows as f^0.8, independent of amplitude".
+        """Text on the power law, such as "the correction acts like a damper: adds loss, independent of amplitude".
 
         A phase, power or unit that the tests do not determine is left out.
         """
         phase, low, high = self.phase_deg
         near = next((text for quarter, text in _QUARTERS.items() if low <= quarter <= high), "")
         turned = np.exp(1j * np.radians(phase))
-        stiffness, loss = ("more" if part > 0.0 else "less" for part in (turned.real, turned.imag))
-        parts = [near or f"{stiffness} stiffness and {loss} loss (phase {number(phase, 2)} deg)"] * self.determined[0]
-        powers = ((self.frequency_power, "f", "frequency"), (self.amplitude_power, "X", "amplitude"))
-        for determined, ((value, low, high), symbol, axis) in zip(self.determined[1:], powers, strict=True):
+        stiffness, loss = ("adds" if part > 0.0 else "lowers" for part in (turned.real, turned.imag))
+        parts = [near or f"{stiffness} stiffness and {loss} loss"] * self.determined[0]
+        powers = ((self.frequency_power, "frequency"), (self.amplitude_power, "amplitude"))
+        for determined, ((value, low, high), axis) in zip(self.determined[1:], powers, strict=True):
             if determined and low <= 0.0 <= high:
                 parts.append(f"independent of {axis}")
             elif determined:
-                parts.append(f"{'grows' if value > 0 else 'falls'} as {symbol}^{number(value, 2)}")
+                parts.append(f"{'grows' if value > 0 else 'falls'} with {axis} to the power {number(value, 2)}")
         quantities = (self.quantity, *self.alternatives)
         if not self.of_one_place and len(quantities) < len(_QUANTITIES):
             parts.append(" or ".join(_QUANTITIES[quantity] for quantity in quantities))
         like = self._known_law() if all(self.determined) else ""
-        return (f"acts like {like}: " if like else "the refitted model needs ") + ", ".join(
-            parts or ["these tests do not determine its form"]
-        )
+        form = ", ".join(parts) or "has a form that these tests do not determine"
+        return f"the correction acts like {like}: {form}" if like else f"the correction {form}"
 
     def _known_law(self) -> str:
         """Name of the element (spring, damper, ...) with nearly the phase and powers of this law; "" without one."""

@@ -135,13 +135,13 @@ class DiagnosisWriter:
         best, claim, base = first.best, first.best.claim, self.base
         assert claim is not None
         advice = f"if the records of the tests confirm this mistake, correct {'; '.join(claim.corrections)}"
-        summary = f"these tests agree if {claim.sentence}"
+        summary = f"probable mistake in the record: {claim.sentence}"
         if self.finding.verdict == "ambiguous":
             summary += "; correct this first: the tests do not decide yet what else is missing"
         after = with_free_gains(best.state.plain, self.search.data)
         closing = Closing(base, holdout=hold_out(base, after, self.search.data.bounds))
         diagnosis = self._build(closing, summary, self._record_entries(first), places=best, next_test=advice)
-        warning = Caveat("mistaken_record", f"fitted to the tests as they are, which only agree if {claim.sentence}")
+        warning = Caveat("mistaken_record", f"fitted to the tests as they are; probable mistake: {claim.sentence}")
         result = replace(diagnosis.result, warnings=(*diagnosis.result.warnings, warning))
         return replace(diagnosis, after=after, remainder=find_regions(after), result=result)
 
@@ -177,7 +177,7 @@ class DiagnosisWriter:
             if after > LARGEST_CLOSED_GAP:
                 closes = f"reduces the held-out gap from {number(before, 2)} to {number(after, 2)} times the noise"
             sentences = [f"a smooth correction {closes}: {gap.sentence}", *causes_text(candidates, self.finding)]
-            sentences += [f"it is largest at {at_fault}"] if at_fault else []
+            sentences += [f"the gap is largest at {at_fault}"] if at_fault else []
         elif is_faulty and at_fault:
             sentences = [f"measure again first: {at_fault}; all other tests disagree with this part"]
         elif is_faulty:
@@ -185,7 +185,7 @@ class DiagnosisWriter:
             advice = _LEVELS_ADVICE
         else:
             sentences = [*dict.fromkeys(["no known effect explains the gap", *causes_text(candidates, self.finding)])]
-            sentences += [f"it is largest at {at_fault}"] if at_fault else []
+            sentences += [f"the gap is largest at {at_fault}"] if at_fault else []
         entries = [NamedCause(UNNAMED, gap.evidence, tuple(candidates))] if gap else []
         places = first.best if is_faulty else None
         reported: Verdict = "described" if gap else "unexplained"
@@ -307,7 +307,7 @@ class DiagnosisWriter:
         """Warnings on the effects and kinds of fault that these tests cannot show."""
         unseen = [proposal.name for proposal in self.search.proposals if not proposal.visible]
         unseen = [name for name in unseen if not get_effect(name).depends_on]  # not those that need a stated condition
-        sentence = f"not identifiable from these tests: {', '.join(unseen)}"
+        sentence = f"these tests cannot show {join_names(unseen, 'or')}"
         notes = [Caveat("effects_not_visible", sentence)] if unseen else []
         directions = {str(test.direction) for test in self.search.base.data_sets}
         return [*notes, *([_ONE_DIRECTION] if len(directions) == 1 else [])]

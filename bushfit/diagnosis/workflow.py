@@ -68,7 +68,7 @@ def diagnose(
             thousands = [claim for claim in claims(data, settings.without) if claim.mistake.scales]
             for claim in ClaimScreening(data).best(thousands, 1):
                 adopted = " --adopt ".join(map(quote_path, claim.labels))
-                error.hint = f"these tests agree if {claim.sentence}: --adopt {adopted} corrects it"
+                error.hint = f"probable mistake in the record: {claim.sentence}; --adopt {adopted} corrects it"
             raise
         known_rows = {(outlier.test, outlier.row) for outlier in excluded}  # a robust fit finds them anew
         candidates = (*outliers, *list_outliers(base.model, split_by_kind(base.data_sets)[1]))

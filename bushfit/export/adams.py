@@ -120,9 +120,7 @@ def export(request: ExportRequest) -> Exported:
         elements.append(_Element(tables, curve, reference, frequency, damping))
     shared = [*chain.from_iterable(map(band_omissions, predictions)), *common_omissions(request)]
     if request.units:
-        sentence = (
-            f"the requested units ({request.units}) are not used: the file states its units, which Adams converts"
-        )
+        sentence = f"the requested units ({request.units}) are not used: Adams converts those that the file states"
         shared.append(Caveat("format_omission", sentence))
     omissions = {kind: [element.error(kind) for element in elements] for kind in _KINDS}
     files = {

@@ -57,6 +57,13 @@ class PronySeries:
     instantaneous: float
     relative_moduli: Array
 
+    @property
+    def loss_errors(self) -> Array:
+        """Loss factor of the series minus that of the model, at the frequencies of `exact`, (n,)."""
+        turned = 2j * np.pi * np.outer(np.geomspace(*self.arms.band, _FINE), self.arms.time)
+        modulus = self.long_term + (turned / (1.0 + turned)) @ self.arms.modulus
+        return modulus.imag / modulus.real - self.exact.imag / self.exact.real
+
 
 @lru_cache(maxsize=1)
 def prony_series(request: ExportRequest) -> list[PronySeries]:
@@ -106,10 +113,12 @@ def prony_omissions(series: Sequence[PronySeries]) -> Iterator[Caveat]:
     """
     low, high = (number(end, 3) for end in series[0].arms.band)
     worst = number(100.0 * max(one.arms.error for one in series), 2)
+    losses = np.concatenate([one.loss_errors for one in series])
+    loss_range = " to ".join(number(end, 2, "+") for end in (losses.min(), losses.max()))
     yield Caveat(
         "format_error",
-        f"compound: the Prony series is valid only from {low} to {high} Hz, error up to {worst} % of the modulus; "
-        "positive terms cannot follow friction exactly",
+        f"compound: the Prony series is valid only from {low} to {high} Hz, with errors of up to {worst} % in the "
+        f"modulus and {loss_range} in the loss factor, because positive terms cannot follow friction exactly",
     )
     if len(series) > 1:
         middle = series[(len(series) - 1) // 2]

@@ -58,25 +58,19 @@ class _Combination(NamedTuple):
     value: Callable[[Mapping[str, Any]], Any]
     names: tuple[str, ...]
     open_with: tuple[str, ...] = ()
-    remark: str = ""
 
 
 _COMBINATIONS = (
     _Combination("sigma_fmax/eps_half", lambda p: p["sigma_fmax"] / p["eps_half"], _FRICTION),
+    _Combination("modulus at small amplitude", lambda p: p["mu"] + p["sigma_fmax"] / p["eps_half"], ("mu", *_FRICTION)),
+    _Combination("modulus of the springpot", lambda p: p["m"] * p["omega"] ** p["alpha"], _SPRINGPOT),
     _Combination(
-        "mu + sigma_fmax/eps_half",
-        lambda p: p["mu"] + p["sigma_fmax"] / p["eps_half"],
-        ("mu", *_FRICTION),
-        remark=" (the friction of small amplitudes)",
-    ),
-    _Combination("m omega^alpha", lambda p: p["m"] * p["omega"] ** p["alpha"], _SPRINGPOT),
-    _Combination(
-        "m/2 omega^alpha sin(pi alpha/2)",
+        "loss modulus of the springpot",
         lambda p: 0.5 * p["m"] * p["omega"] ** p["alpha"] * np.sin(np.pi * p["alpha"] / 2.0),
         _SPRINGPOT,
     ),
     _Combination(
-        "mu + m/2 omega^alpha cos(pi alpha/2)",
+        "storage modulus without friction",
         lambda p: p["mu"] + 0.5 * p["m"] * p["omega"] ** p["alpha"] * np.cos(np.pi * p["alpha"] / 2.0),
         ("mu", *_SPRINGPOT),
         open_with=_SPRINGPOT,
@@ -116,7 +110,7 @@ def undetermined_parameters(
         for name in zero:
             effect = effect_name_of(name)
             remark = f": these tests do not show {effect}" * (effect in unseen)
-            lines.append(Caveat("no_difference", f"{name} does not differ from {neutral[name]:g}{remark}"))
+            lines.append(Caveat("no_difference", f"{name} is {neutral[name]:g} within its error{remark}"))
         visible = [i for i, name in enumerate(names) if name not in zero and effect_name_of(name) not in unseen]
         if not visible:
             return lines
@@ -220,7 +214,7 @@ def _known_combinations(
     enough = min(_KNOWN, _BETTER * min(float(np.linalg.norm(rows[name])) for name in involved))
     slow = measured_range(model, data_sets).frequency[0]
     values = {**model.values, "omega": 2.0 * np.pi * slow}
-    for formula, function, names, open_with, remark in _COMBINATIONS:
+    for formula, function, names, open_with in _COMBINATIONS:
         if not (set(names) <= rows.keys() and set(open_with or names) & set(involved)):
             continue
         modulus = function(values)
@@ -229,5 +223,5 @@ def _known_combinations(
             stepped = function({**values, name: values[name] * (1.0 + 1j * _COMPLEX_STEP)})
             change += stepped.imag / _COMPLEX_STEP / modulus * rows[name]
         if (error := float(np.linalg.norm(change))) < enough:
-            condition = f" at {slow:.3g} Hz" if "omega" in formula else ""
-            yield f"{formula}{condition} = {format_range('Pa', modulus, digits=4)} to {_percent(error)}{remark}"
+            condition = f" at {slow:.3g} Hz" if "alpha" in names else ""
+            yield f"{formula}{condition} = {format_range('Pa', modulus, digits=4)} (standard error {_percent(error)})"

@@ -121,7 +121,7 @@ class Bushing:
                 "impossible bushing",
                 place="inner_radius, outer_radius",
                 found=f"{1e3 * self.inner_radius:g} mm and {1e3 * self.outer_radius:g} mm",
-                expected="inner_radius below outer_radius",
+                expected="an inner size below the outer size",
                 hint="check that the values are radii, not diameters, and that inner and outer are not swapped",
             )
         if self.shape == "calibrated" and self.correction is None:

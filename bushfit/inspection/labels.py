@@ -90,7 +90,8 @@ def keys_from_labels(
     for key, role in _CONSTANT_ROLES.items() if is_sweep else ():
         if role not in table.roles and key not in test_options:
             origin, quantity = _constant_quantity(table, place, key, {**sources, "from the text above": counted})
-            convention = test_options.get("amplitude") or quantity.convention
+            conventions = (text.convention for text in counted.quantities if text.text == quantity.text)
+            convention = test_options.get("amplitude") or quantity.convention or next(conventions, None)
             keys[key] = sentence = quantity.text
             if role == "amplitude" and convention in ("peak-to-peak", "rms"):
                 keys[key] = _zero_to_peak(quantity.text, convention)

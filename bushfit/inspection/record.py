@@ -186,7 +186,7 @@ def campaign_text(name: str, bushing: Mapping[str, str] | None, files: Sequence[
     head = [*(["[bushing]"] if bushing else []), *key_lines({"name": name, **(bushing or {})}), ""]
     tests = [inspection for kind in _TABLES for inspection in files if inspection.kind == kind]
     report = "# [report] fills the head of the report: "
-    report += 'customer = "...", part_number = "...", drawing, laboratory, date, logo\n'
+    report += 'customer = "...", part_number = "...", drawing, laboratory, date, logo, operating_points\n'
     return "\n".join([*head, *campaign_tables(tests, folder), report])
 
 

@@ -133,7 +133,7 @@ class Comparison:
         names = [name for name, band in self.bands.items() if stiffness < limit and self.significant(band).any()]
         if joint < limit:
             parameters = [row.name for row in self.parameters if row.holm is not None and row.holm < CHANCE]
-            names += parameters or ["all parameters together"]
+            names += parameters or ["the parameters taken together"]
         return names
 
     def sentences(self) -> list[str]:
@@ -281,7 +281,5 @@ def _describe_difference(band: Band, unit: str, contrast: Contrast) -> str:
     none = (band.low <= 0.0) & (band.high >= 0.0)
     if none.any():
         largest = number(float(np.maximum(-band.low, band.high)[none].max()), 2)
-        parts.append(
-            f"{'elsewhere ' if parts else ''}no difference detected (up to {largest}{unit} cannot be excluded)"
-        )
+        parts.append(f"{'elsewhere ' if parts else ''}no difference detected (up to {largest}{unit} is possible)")
     return ", ".join(parts)

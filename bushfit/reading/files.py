@@ -81,7 +81,9 @@ def view_bytes(
             if file.is_symlink():
                 raise kind("this link leads to no file", file=file, found=f"a link to {file.readlink()}")
             siblings = [path.name for path in file.parent.iterdir()] if file.parent.is_dir() else []
-            hint = did_you_mean(file.name, siblings) or "check the path for a typing error"
+            # a name with another number is another part or test
+            similar = [name for name in siblings if re.findall(r"\d+", name) == re.findall(r"\d+", file.name)]
+            hint = did_you_mean(file.name, similar, similarity=0.85) or "check the path for a typing error"
             expected = "a path in a file is relative to the folder of that file"
             raise kind("there is no such file", file=file, expected=f"an existing file; {expected}", hint=hint)
         if not file.is_file():

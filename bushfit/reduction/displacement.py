@@ -114,9 +114,7 @@ def _moving_channels(channels: Sequence[DisplacementHistory]) -> list[Displaceme
     still = [channel.direction for channel in channels if not np.ptp(channel.displacement)]
     if len(still) == len(channels):
         raise MeasurementError(no_motion, place=", ".join(map(str, still)), expected="displacements that change")
-    notes = tuple(
-        Caveat("still_channel", "left out, because the displacement is constant").about(place) for place in still
-    )
+    notes = tuple(Caveat("still_channel", "left out: the displacement is constant").about(place) for place in still)
     return [replace(channel, notes=(*channel.notes, *notes)) for channel in channels if channel.direction not in still]
 
 

@@ -92,7 +92,7 @@ class BatchFile:
         limits: number of parts by result against the limits.
         missed: names of the parts that miss a limit.
         conditional: names of the parts that pass conditionally.
-        not_judged: names of the parts that were not judged: poor fit.
+        not_judged: names of the parts that were not judged.
         differ: names of the parts that differ from the others.
         headline: outcome in one sentence.
         warnings: warnings on the batch, the important ones first.

@@ -9,7 +9,8 @@ import pytest
 from bushfit.batch.document import Estimate, RowFile
 from bushfit.batch.limits import RESULTS, Limits, judge_part, read_limits, resolve_limits
 from bushfit.batch.manifest import Manifest, RowSettings, read_manifest
-from bushfit.batch.quantities import list_quantities, parse_point
+from bushfit.batch.quantities import list_quantities
+from bushfit.geometry.point import parse_point
 from bushfit.reduction.arrays import median_and_scatter
 
 ROW = '[[bushings]]\ncampaign = "a.toml"\n'

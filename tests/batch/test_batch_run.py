@@ -85,8 +85,8 @@ def test_a_parameter_on_a_bound_of_its_fit_passes_on_condition_and_is_named(type
     assert good["at bound"] == ""
     assert "mu (max)" in held["at bound"]
     assert "mu is at the max given in [fit]" in held["warnings"]
-    assert "max bound of the fit" in held["undecided limits"]
-    assert "warning: at a bound of the fit, because the tests do not determine them: " in done.stderr
+    assert "the maximum that the fit allows" in held["undecided limits"]
+    assert ": the fit ends at a bound" in done.stderr
     assert "mu of b1" in done.stderr
     assert "b1 passes conditionally: mu 0.2 MPa" in done.stderr
     typed("batch", "bushings/b[013]/bushing.toml", "-o", "none", "--no-plots", "--effect", "inertia", "--json")

@@ -99,9 +99,7 @@ def test_a_part_without_the_sweep_of_the_others_is_named_and_not_compared():
     result = BatchResult(plan, records, 0, 0.0, ())
     assert np.flatnonzero(np.isnan(result.compared_values["mu"][0])).tolist() == [6]
     parts: Any = [SimpleNamespace(name=f"P{number}", poor_fit="", warning_kinds=()) for number in range(7)]
-    assert [*map(str, result.warnings(parts))] == [
-        "no sweep, unlike the other parts, and so not compared with them: P6"
-    ]
+    assert [*map(str, result.warnings(parts))] == ["not compared with the other parts, because a sweep is missing: P6"]
 
 
 @pytest.mark.parametrize(("count", "level"), [(1, 0.1), (2, 0.1), (3, 0.2), (4, 0.2)])

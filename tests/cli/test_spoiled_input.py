@@ -96,7 +96,7 @@ UNEXPECTED = {
     "the compiler of the FMU failed", "the connection to the Dask scheduler is lost",
     "the effect | of | cannot be imported",
     "the files contain several directions",
-    "the headers do not state how amplitudes are counted", "the law cannot be run", "the results do not fit together",
+    "the law cannot be run", "the results do not fit together",
     "the results have different kinds of motion", "the static and the dynamic fit do not converge in turn",
     "matplotlib cannot read its settings and no picture is drawn",
     "there are results already", "this cannot be compared", "this format represents one bushing",

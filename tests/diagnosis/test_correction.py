@@ -216,8 +216,8 @@ def found_in(campaign: Campaign, fitted: Fitted) -> PowerLaw:
         ((60e3, 180.0, 2.0, 0.0), "a mass"),
         ((60e3, 0.0, 0.0, 2.0), "a spring that stiffens"),
         ((60e3, 90.0, 0.0, -1.0), "dry friction"),
-        ((60e3, 40.0, 1.4, 0.7), "more stiffness and more loss"),
-        ((60e3, -60.0, 0.6, -0.6), "more stiffness and less loss"),
+        ((60e3, 40.0, 1.4, 0.7), "adds stiffness and adds loss"),
+        ((60e3, -60.0, 0.6, -0.6), "adds stiffness and lowers loss"),
     ],
 )
 def test_laws_are_found_with_their_phase_and_powers(law, words, measured, fitted):
@@ -237,11 +237,11 @@ def test_laws_are_found_with_their_phase_and_powers(law, words, measured, fitted
 @pytest.mark.parametrize(
     ("units", "phase", "power", "words"),
     [
-        (("stiffness",), 90.0, 1.0, ("more loss", "acts like a damper")),
-        (("stiffness",), -90.0, 1.0, ("less loss",)),
+        (("stiffness",), 90.0, 1.0, ("adds loss", "acts like a damper")),
+        (("stiffness",), -90.0, 1.0, ("lowers loss",)),
         (("gain", "stiffness"), 90.0, 1.0, ("acts like a damper or a delay of the displacement",)),
-        (("stiffness",), 93.6, 1.0, ("more loss (phase 94 deg)",)),
-        (("stiffness",), 180.0, 2.0, ("less stiffness", "grows as f^2", "acts like a mass")),
+        (("stiffness",), 93.6, 1.0, ("lowers stiffness and adds loss",)),
+        (("stiffness",), 180.0, 2.0, ("lowers stiffness", "grows with frequency to the power 2", "acts like a mass")),
     ],
 )
 def test_a_law_is_called_what_its_phase_and_powers_act_like(units, phase, power, words):
@@ -273,4 +273,4 @@ def test_a_mass_for_which_the_rig_compensates_too_much_has_no_name(measured):
     ]
     found = asked(replace(campaign, sweeps=tuple(sweeps)))
     assert {effect.name for effect in found.effects} <= {"unnamed"}
-    assert "grows as f^2, independent of amplitude" in found.summary
+    assert "grows with frequency to the power 2, independent of amplitude" in found.summary

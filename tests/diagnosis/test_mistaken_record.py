@@ -68,7 +68,7 @@ def test_a_mistake_is_named_with_the_line_that_puts_it_right(truth, measured):
     diagnosis = asked(campaign)
     assert diagnosis.verdict == "named"
     assert [effect.label for effect in diagnosis.effects] == truth.split()
-    assert diagnosis.summary.startswith("these tests agree if ")
+    assert diagnosis.summary.startswith("probable mistake in the record: ")
     for effect, entry in zip(diagnosis.effects, diagnosis.to_document()["effects"], strict=True):
         assert (entry["level"], entry["parameters"], entry["test"]) == ("record", {}, effect.test)
         assert entry["correction"] in diagnosis.next_test
@@ -108,7 +108,7 @@ def test_a_mistake_in_every_explanation_is_reported_before_the_rest_is_decided(m
     """Loops in kgf of a bushing whose sleeve or radial fixture flexes: the effects are ambiguous, the unit is not."""
     diagnosis = asked(in_kilograms(measured({"sleeve_compliance": {"compliance": 2e-8}}, SHARED)))
     assert said(diagnosis) == "ambiguous kilogram_force + kilogram_force"
-    assert diagnosis.summary.startswith("these tests agree if the forces of loop_axial_1 and loop_axial_2 are kgf")
+    assert diagnosis.summary.startswith("probable mistake in the record: the forces of loop_axial_1 and loop_")
     assert not diagnosis.added
 
 

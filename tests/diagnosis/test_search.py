@@ -116,7 +116,7 @@ def test_what_one_place_alone_shows_is_to_be_measured_again(measured, tamper, pl
 def test_a_loop_at_an_amplitude_of_its_own_may_deviate_by_a_law(measured):
     diagnosis = asked(loop_too_strong(measured(plan=SHARED)))
     assert said(diagnosis) == "described unnamed"
-    assert diagnosis.summary.endswith("it is largest at the loop loop_axial_2")
+    assert diagnosis.summary.endswith("the gap is largest at the loop loop_axial_2")
 
 
 def test_errors_of_every_level_within_the_class_are_nothing(measured):

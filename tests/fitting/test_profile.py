@@ -126,11 +126,11 @@ def sweep(*amplitudes: float, band: tuple[float, ...] = BAND) -> SimulatedSweep:
 LACKING = {
     "small amplitudes": (
         (loop(3e-5, 0.1),), (sweep(1e-5, 3e-5),),
-        "sigma_fmax and eps_half are determined only as a ratio", "mu + sigma_fmax/eps_half",
+        "sigma_fmax and eps_half are determined only as a ratio", "modulus at small amplitude",
     ),
-    "one loop": ((loop(1e-3, 0.1),), (), "one loop rate, 0.1 Hz", "sin(pi alpha/2) at 0.1 Hz"),
+    "one loop": ((loop(1e-3, 0.1),), (), "one loop rate, 0.1 Hz", "loss modulus of the springpot at 0.1 Hz"),
     "loops of one rate": (
-        (loop(1e-3, 0.1), loop(3e-4, 0.1)), (), "mu, m and alpha cannot be", "mu + m/2 omega^alpha",
+        (loop(1e-3, 0.1), loop(3e-4, 0.1)), (), "mu, m and alpha cannot be", "storage modulus without friction",
     ),
     "one frequency": (
         (loop(1e-3, 10.0),), (sweep(1e-4, 5e-4, band=(10.0,)),), "one frequency, 10 Hz", "at 10 Hz",

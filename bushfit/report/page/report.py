@@ -16,17 +16,18 @@ from bushfit.diagnosis.document import DiagnosisFile
 from bushfit.diagnosis.record import format_odds
 from bushfit.effects.unnamed import effect_label
 from bushfit.errors import ModelError
-from bushfit.geometry import STRAINING, TRANSLATION
+from bushfit.geometry import STRAINING, TRANSLATION, get_places
+from bushfit.geometry.point import parse_point
 from bushfit.model.file import from_document, require_schema
 from bushfit.model.result import Result
 from bushfit.prediction.caveats import agrees_within_noise, warnings_of
-from bushfit.prediction.stiffness import Prediction
+from bushfit.prediction.stiffness import Prediction, predict
 from bushfit.report import plots
 from bushfit.report.diagnosed import permitted_use
 from bushfit.report.page import render_page
 from bushfit.report.page.record import JOINT, MODELS, predict_tables, tested_tables
 from bushfit.report.page.svg import Picture, picture
-from bushfit.report.page.values import headline_texts, value_rows
+from bushfit.report.page.values import headline_texts, middle_point, value_rows
 from bushfit.report.parameters import correlation_texts, effect_sizes, parameter_rows
 from bushfit.report.results import ResultFile
 from bushfit.report.tables import DISPLAYS
@@ -85,7 +86,11 @@ def report_page(files: Sequence[ResultFile], date: str | None = None, folder: Pa
     tested = tested_tables(tables)
     by_name, tests = predict_tables(result, tables, tested.get("sweeps")), campaign.tests if campaign else ()
     predictions = [*by_name.values()][:_MOST_PLACES]
-    place_warnings = [prediction.warnings for prediction in by_name.values()]
+    points_listed = [parse_point(text) for text in head.pop("operating_points", "").split("; ") if text]
+    places = [(point, place) for point in points_listed for place in get_places(point.place, result.specimens)]
+    points = [predict(result, place, [point.frequency], [point.amplitude]) for point, place in places]
+    place_warnings = [prediction.warnings for prediction in (*by_name.values(), *points)]
+    points = points or [middle_point(result, prediction) for prediction in predictions]
     notes = to_caveats(diagnosis["warnings"], diagnosis.get("warning_kinds", ())) if diagnosis else ()
     warnings = warnings_of(result, place_warnings, notes)
     charts = {file.name: file for file in files if file.kind == "figure"}
@@ -100,7 +105,7 @@ def report_page(files: Sequence[ResultFile], date: str | None = None, folder: Pa
         "versions": {"bushfit": provenance.get("bushfit") or "", **provenance.get("packages", {})},
         "head": {key.replace("_", " ").capitalize(): text for key, text in head.items()},
         "conditions": summarize_conditions(test.conditions for test in tests),
-        "headlines": [headline_texts(result, prediction) for prediction in predictions],
+        "headlines": [headline_texts(result, point) for point in points],
         "agrees": agrees_within_noise,
         "sizes": effect_sizes,
         "label": effect_label,

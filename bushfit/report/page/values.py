@@ -21,30 +21,40 @@ _STATIC = 1.0
 _FREQUENCIES, _AMPLITUDES, _ROWS = 3, 2, 12
 
 
-def headline_texts(result: Result, prediction: Prediction) -> dict[str, str]:
-    """Key values of a direction or specimen for the top of a report, as texts.
-
-    The operating point is the middle one of the predicted amplitudes and the frequency nearest to the geometric mean of
-    the lowest and highest. The static stiffness is that of the static curve to the same amplitude, if a test was made
-    at 1 Hz or below and the model has a law in time. The dynamic stiffening is the ratio of dynamic to static
-    stiffness; its interval includes the correlation of the two.
+def middle_point(result: Result, prediction: Prediction) -> Prediction:
+    """Predict the middle amplitude and, of the frequencies, that nearest to the geometric mean of lowest and highest.
 
     Args:
         result: final model.
         prediction: prediction for one direction or specimen.
 
     Returns:
+        Prediction at this one operating point.
+    """
+    amplitudes, frequencies = np.unique(prediction.amplitude), np.unique(prediction.frequency)
+    middle = math.sqrt(frequencies[0] * frequencies[-1])
+    frequency = frequencies[np.argmin(np.abs(np.log(frequencies / middle)))]
+    return predict(result, prediction.direction, [frequency], [amplitudes[(amplitudes.size - 1) // 2]])
+
+
+def headline_texts(result: Result, point: Prediction) -> dict[str, str]:
+    """Key values of a direction or specimen for the top of a report, as texts.
+
+    The static stiffness is that of the static curve to the same amplitude, if a test was made
+    at 1 Hz or below and the model has a law in time. The dynamic stiffening is the ratio of dynamic to static
+    stiffness; its interval includes the correlation of the two.
+
+    Args:
+        result: final model.
+        point: prediction for one direction or specimen at one operating point.
+
+    Returns:
         Texts with units by template variable: operating point, dynamic stiffness and loss with their 95 % bands, static
         stiffness and dynamic stiffening.
     """
-    place = prediction.direction
+    place, frequency, amplitude = point.direction, float(point.frequency[0]), float(point.amplitude[0])
     (length, to_length), _, (name, factor) = place.display
-    amplitudes, frequencies = np.unique(prediction.amplitude), np.unique(prediction.frequency)
-    amplitude = float(amplitudes[(amplitudes.size - 1) // 2])
-    middle = math.sqrt(frequencies[0] * frequencies[-1])
-    frequency = float(frequencies[np.argmin(np.abs(np.log(frequencies / middle)))])
-    lowest = min([*(result.measured.frequency[:1] if result.measured else ()), *frequencies.tolist()])
-    point = predict(result, place, [frequency], [amplitude])
+    lowest = min([*(result.measured.frequency[:1] if result.measured else ()), frequency])
     unit, to_unit = display_unit(name, factor, float(point.stiffness.value[0]))
     dynamic, loss = band_at(point.stiffness, 0, to_unit), band_at(point.loss_factor, 0)
     preload, kelvin = point.conditions.preload, point.conditions.temperature

@@ -67,6 +67,4 @@ def comparison_figure(comparison: ComparisonFile) -> style.Chart:
         dashed = [Line2D([], [], color=style.INK, lw=style.LINE, ls=dashes) for dashes in style.DASHES[: len(levels)]]
         names = [f"{label}: {shorten(name, 20)}" for label, name in comparison.names.items()]
         style.legend(grid[2 * row, 1], lines, names, "", dict(zip(level_names, dashed, strict=True)))
-    return figure.explain(
-        "Shaded: 95 % band of each single point. Stated differences hold for all points together, with wider bands."
-    )
+    return figure.explain("Shaded: 95 % band of each point. The stated differences hold for all points together.")

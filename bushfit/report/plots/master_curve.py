@@ -53,6 +53,4 @@ def master_curve_figure(model: Model, shifted_sweeps: Sequence[ShiftedSweep], ti
         for axes in panels:
             style.make_logarithmic(axes, reach)
         style.color_bar(panels[-1], [f"{degree:g} °C" for degree in degrees], "temperature")
-    return figure.explain(
-        f"Line: model at 23 °C, {', '.join(levels)}. Points: measured, shifted to 23 °C by the model."
-    )
+    return figure.explain(f"Line: model at 23 °C, {', '.join(levels)}. Points: tests, shifted to 23 °C by the model.")
