@@ -77,7 +77,7 @@ class Bounds:
             expected = "min, max, nominal with tolerance, or sigma"
             raise ValueError(CampaignError("these keys do not form a limit", expected=expected))
         if self.min is not None and self.max is not None and self.min >= self.max:
-            raise ValueError(CampaignError("no value is within these limits", expected="min below max"))
+            raise ValueError(CampaignError("no value meets these limits", expected="min below max"))
 
     @property
     def fixed(self) -> tuple[float, float]:
@@ -193,9 +193,7 @@ def read_limits(path: Path, rows: Sequence[Row]) -> Limits:
     """
     limits = validate_tables(parse_toml(path, "a limits file"), path, Limits)
     if not (limits.bounds or limits.verdicts):
-        raise CampaignError(
-            "the file contains no limit", file=path, expected='such as [parameters.mu] with max = "2 MPa"'
-        )
+        raise CampaignError("the file has no limit", file=path, expected='such as [parameters.mu] with max = "2 MPa"')
     silent = [row.name for row in rows if not row.settings.diagnoses] if limits.verdicts else []
     if silent:
         found = silent[0] + (f" and {len(silent) - 1} more" if len(silent) > 1 else "") + " without it"
