@@ -5,11 +5,13 @@ import os
 # Small matrices, and a worker a core: threads of the linear algebra would only stand in each other's way.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import production
 import pytest
-from commandline import Run, Shared, typing
+from commandline import Done, Run, Shared, typing
 from fits import joint_fit
 from hypothesis import HealthCheck, settings
 from paper import CMP_15961, TABLE_1
@@ -111,3 +113,19 @@ def shared(tmp_path_factory) -> Shared:
     store = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "shared"
     store.mkdir(exist_ok=True)
     return Shared(store)
+
+
+@pytest.fixture(scope="session")
+def campaign_run(shared, root, tmp_path_factory) -> Callable[[str], tuple[Path, Done]]:
+    """The folder of `bushfit run` of a campaign in configs, without pictures, and what it printed; made once."""
+    home = tmp_path_factory.mktemp("runs")
+    for part in ("configs", "data"):
+        (home / part).symlink_to(root / part)
+
+    @cache
+    def run(name: str) -> tuple[Path, Done]:
+        done = shared.call(home, "run", f"configs/{name}.toml", "-o", name, "--no-plots", "--json")
+        assert done.returncode == 0, done.stderr
+        return home / name, done
+
+    return run

@@ -36,6 +36,7 @@ def test_a_part_that_differs_is_named_with_the_parameter_that_was_changed(made, 
     assert document["differ"] == [f"part_0{LOSSY}", f"part_{SOFT}"]
     assert (next(iter(lossy["deviations"])), next(iter(soft["deviations"]))) == ("alpha", "mu")
     assert lossy["deviations"]["alpha"] > document["detectable"]
+    assert document["detectable"] == smallest_deviation(COUNT, 8), "of 8 quantities"
     assert soft["deviations"]["measured stiffness"] < -document["detectable"]
     assert list(np.flatnonzero(table["differs in"] != "")) == [LOSSY, SOFT]
     assert table["robust z of mu [-]"][SOFT] == pytest.approx(soft["deviations"]["mu"], abs=0.01)

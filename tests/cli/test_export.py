@@ -138,12 +138,11 @@ def text_of(file: Path) -> str:
     params=some([("cmp_15961", PAPER), ("mystery_mount", MOUNT)], [("mystery_mount", MOUNT)]),
     ids=["paper", "mount"],
 )
-def ran(request, root, tmp_path_factory, work) -> tuple[Path, Path, tuple[str, ...], list[str]]:
+def ran(request, root, campaign_run) -> tuple[Path, Path, tuple[str, ...], list[str]]:
     """A campaign, the folder of its run, what must be warned of there, and all its warnings."""
     name, words = request.param
-    folder, campaign = tmp_path_factory.mktemp(name) / "run", root / f"configs/{name}.toml"
-    done = typing(work)("run", campaign, "-o", folder, "--no-plots", "--json")
-    return campaign, folder, words, json.loads(done.stdout)["warnings"]
+    folder, done = campaign_run(name)
+    return root / f"configs/{name}.toml", folder, words, json.loads(done.stdout)["warnings"]
 
 
 @pytest.fixture

@@ -6,22 +6,11 @@ from pathlib import Path
 import pytest
 from commandline import typing
 
-#: Campaigns whose pages are looked at, by the names of their folders.
-CAMPAIGNS = {"cmp_15961": "configs/cmp_15961.toml", "mystery_mount": "configs/mystery_mount.toml"}
-
 
 @pytest.fixture(scope="session")
-def results(root, tmp_path_factory) -> Callable[[str], Path]:
-    """The folder of `bushfit run` of a campaign by its name, without pictures; each is made once."""
-    home = tmp_path_factory.mktemp("results")
-
-    def made(name: str) -> Path:
-        folder = home / name
-        if not folder.exists():
-            typing(root)("run", CAMPAIGNS[name], "-o", folder, "--no-plots", "-q")
-        return folder
-
-    return made
+def results(campaign_run) -> Callable[[str], Path]:
+    """The folder of `bushfit run` of a campaign by its name."""
+    return lambda name: campaign_run(name)[0]
 
 
 @pytest.fixture(scope="session")
