@@ -22,8 +22,11 @@ _TABLES: dict[str, dict[str, Any]] = tomllib.loads(Path(__file__).with_suffix(".
 QUESTIONS: dict[str, str] = _TABLES.pop("questions")
 #: All metadata options, except columns and units, by key.
 STATED: dict[str, dict[str, Any]] = {key: table for group in _TABLES.values() for key, table in group.items()}
-#: Descriptions of files that are not test files, by extension.
-_NO_TESTS = {".toml": "a campaign or another TOML file", ".json": "a model or another JSON file"}
+#: Files that are not test files: bytes that they begin with, and description, by extension.
+_NO_TESTS = {
+    ".toml": (rb"", "a campaign or another TOML file"),
+    ".json": (rb'{\s*"schema": "bushfit/', "a result of bushfit"),
+}
 #: Pattern of an inline table of TOML in the hint of an error.
 _TABLE = re.compile(r"\{[^}]*\}")
 #: Patterns of an inline table `columns` or `units`, and of one of its entries.
@@ -108,7 +111,8 @@ def require_tests(context: click.Context, _: click.Parameter, value: Any) -> Any
     for file in () if context.resilient_parsing else files:  # no error during shell completion
         if not os.path.exists(file):  # noqa: PTH110  # Path.exists raises an error for a name that is too long
             view_bytes(file, MeasurementError)
-        if (found := _NO_TESTS.get(file.suffix.lower())) and file.is_file():
+        start, found = _NO_TESTS.get(file.suffix.lower(), (b"", ""))
+        if found and file.is_file() and re.match(start, view_bytes(file, MeasurementError)):
             hint = "bushfit diagnose looks at all tests of a campaign together; name its files, or their folder, here"
             raise MeasurementError("a test file is needed", file=file, found=found, expected="a table", hint=hint)
     return value

@@ -12,7 +12,7 @@ from bushfit.campaign.bodies import SpecimenSettings
 from bushfit.errors import BushfitError, NoTestError, ResonanceTestError, quote_path
 from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Direction, Motion, Place, Specimen
 from bushfit.reading.finding import find_table
-from bushfit.reading.headers import HINTS, LOOP_COLUMNS, RESONANCE_COLUMNS, SWEEP_COLUMNS, Vocabulary
+from bushfit.reading.headers import ERRORS, HINTS, LOOP_COLUMNS, RESONANCE_COLUMNS, SWEEP_COLUMNS, Vocabulary
 from bushfit.reading.labelled import Rows
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.names import direction_of_file, named_direction
@@ -97,13 +97,8 @@ def recognize_table(file: Path, test_options: Mapping[str, Any]) -> tuple[Table,
     if set(best.roles) in ({"time", "displacement"}, {"time", "force"}) and '"..."' in column:
         history = "a displacement alone is a history for bushfit respond; " * (lacking == "force")
         advice = f"{history}a test needs a column for the {lacking}, too: if another file has it, join the two"
-    raise best.header_error(
-        "the columns are not those of a test",
-        kind=NoTestError,
-        found=", ".join(best.headers) + f" (understood: {understood})" if understood else None,
-        expected="time, displacement and force; or frequency, amplitude, and stiffness with loss factor or phase",
-        hint=advice,
-    )
+    found = ", ".join(best.headers) + f" (understood: {understood})" if understood else None
+    raise best.header_error(**ERRORS["not_a_test"], kind=NoTestError, found=found, hint=advice)
 
 
 def count_other_units(table: Table) -> int:

@@ -57,21 +57,20 @@ def find_lines_above(table: Table) -> list[Line]:
     """
     layout, last = table.layout, table.layout.lines_before_data
     not_above = (layout.header_line, layout.units_line)
-    lines = [line for line in table.source.head if line.number <= last and line.number not in not_above]
-    lines = [plain_numbers(line, table.first_decimal) for line in lines]
+    lines = list[Line]()
+    for line in (line for line in table.source.head if line.number <= last and line.number not in not_above):
+        cells = cells_of(line, layout.delimiter) if line.number > layout.header_line else line.content
+        lines.append(plain_numbers(Line(line.number, cells), table.first_decimal))
     for index, (header, unit) in enumerate(zip(table.headers, layout.units, strict=True)):
-        if plain_name(header) in STEPS and is_like_number(unit):  # of an oscilloscope
+        is_step = plain_name(header) in STEPS
+        if is_step and is_like_number(unit):  # of an oscilloscope
             lines.append(Line(last, [header, unit]))
-        elif (
-            plain_name(header) in STEPS
-            and len({row[index] for row in table.first_rows} - {""}) == 1
-            and (unit or split_unit(header)[1])
-        ):
+        elif is_step and (unit or split_unit(header)[1]) and len({row[index] for row in table.first_rows} - {""}) == 1:
             lines.append(Line(last, [header, table.first_row[index], unit]))
     marks = {mark: header for header in table.headers for mark in _FOOTNOTE_MARK.findall(header)}
     for line in table.source.tail():
-        cells = list(map(str, cells_of(line, layout.delimiter)))
-        is_note = not (any(map(is_like_number, cells)) or is_summary_row(cells) or layout.is_repeated(cells))
+        texts = list(map(str, cells_of(line, layout.delimiter)))
+        is_note = not (any(map(is_like_number, texts)) or is_summary_row(texts) or layout.is_repeated(texts))
         if line.number > last and is_note:
             mark = line.text[:1]
             lines.append(Line(line.number, f"{marks[mark]}: {line.text[1:]}") if mark in marks else line)

@@ -11,6 +11,7 @@ from bushfit import units
 from bushfit.caveat import Caveat
 from bushfit.errors import NoColumnError
 from bushfit.reading.headers import (
+    ERRORS,
     ROLE_SETS,
     ZERO_TO_PEAK,
     Column,
@@ -31,6 +32,7 @@ from bushfit.reading.inference import (
     moves_along,
     name_parallel_spring,
 )
+from bushfit.reading.roles import PAIRS
 from bushfit.reading.si_columns import column_of, first_numbers, is_angular, refuse_second_unit
 from bushfit.reading.table import Table
 from bushfit.reading.times import parse_clock
@@ -113,7 +115,8 @@ def classify(
         if written != column.unit and units.is_compatible(written, column.unit or ""):
             sentence = f'"{column.header}" is read in the stated unit {column.unit}, not in {written} of the header'
             notes.append(Caveat("stated_unit", sentence))
-    if {"displacement", "force"} <= {*roles} and "time" in table.names and "time" not in roles:
+    is_first_free = all(column.index for column in roles.values())
+    if {"displacement", "force"} <= {*roles} and "time" in table.names and "time" not in roles and is_first_free:
         x = column_of(table, Heading("time"), 0, stated_units.get("time"))  # over which programs write histories
         if plain_name(x.header) == "x" and units.is_compatible(x.unit or "s", "s") and not table.labels_above.sampling:
             roles["time"] = x
@@ -168,13 +171,9 @@ def _require_plain_names(table: Table, roles: Mapping[str, Column]) -> None:
     is_doubtful = len(numbered) > 1 or (numbered and loss > _LARGE_LOSS * storage)
     if len(both) > 1 and is_doubtful and _NUMBERED.fullmatch(names["storage_stiffness"]):
         header = roles["storage_stiffness"].header
-        raise table.header_error(
-            "numbered columns may be repeats, parts, or storage and loss",
-            found=", ".join(table.headers),
-            expected="one stiffness and its loss, or the storage and loss stiffness",
-            hint=f'name the columns: columns = {{ stiffness = "{header}", phase = "..." }} in the campaign for each '
-            f'test, or columns = {{ storage_stiffness = "{header}", loss_stiffness = "..." }}',
-        )
+        keys = [f'columns = {{ {pair[0]} = "{header}", {pair[1]} = "..." }}' for pair in PAIRS[1:3]]
+        hint = f"name the columns: {keys[0]} in the campaign for each test, or {keys[1]}"
+        raise table.header_error(**ERRORS["numbered_columns"], found=", ".join(table.headers), hint=hint)
 
 
 def _stated_indices(table: Table, vocabulary: Vocabulary, columns: Mapping[str, str]) -> dict[int, str]:

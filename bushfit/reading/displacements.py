@@ -10,7 +10,7 @@ from bushfit.caveat import Caveat
 from bushfit.errors import MeasurementError, error_location
 from bushfit.geometry import TRANSLATION, Direction, Place, Specimen, get_places
 from bushfit.reading.finding import find_table
-from bushfit.reading.headers import DISPLACEMENT_COLUMNS
+from bushfit.reading.headers import DISPLACEMENT_COLUMNS, ERRORS
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.loops import increasing_time, time_column
 from bushfit.reading.measurement import Floats
@@ -89,12 +89,8 @@ def read_displacements(
         if axis and not motion:
             named_places = [place for place in named_places or get_places(axis, specimens) if place.axis == axis]
         if len({place.axis for place in named_places}) != 1:
-            raise table.header_error(
-                "the direction of this displacement is not stated",
-                found=f'"{column.header}"',
-                expected="axial, radial or torsion in the header or in the name of the file",
-                hint=f"state it: --direction {next(map(repr, map(str, named_places)), 'axial (or radial, torsion)')}",
-            )
+            hint = f"state it: --direction {next(map(repr, map(str, named_places)), 'axial (or radial, torsion)')}"
+            raise table.header_error(**ERRORS["no_axis_of_displacement"], found=f'"{column.header}"', hint=hint)
         roles = dict.fromkeys(named_places, "displacement")
     wanted = {role: si_column(table, role, place) for place, role in roles.items()}
     rate, note = (None, "") if "time" in table.roles else sampling_rate_above(table)
@@ -135,12 +131,8 @@ def even_time(time: Floats) -> tuple[Floats, tuple[Caveat, ...]]:
     if np.any(np.abs(time - even) > _ROUNDING * step):
         count = round((time[-1] - time[0]) / step) + 1
         if count > _MOST_ADDED * time.size:
-            raise MeasurementError(
-                "the times are too uneven",
-                found=f"steps of {steps.min():.3g} to {steps.max():.3g} s",
-                expected=f"even steps, such as {step:.3g} s",
-                hint="export the record with a fixed rate, or without its pauses",
-            )
+            found, expected = f"steps of {steps.min():.3g} to {steps.max():.3g} s", f"even steps, such as {step:.3g} s"
+            raise MeasurementError(**ERRORS["uneven_times"], found=found, expected=expected)
         even = np.linspace(time[0], time[-1], count)
         rows = np.round(steps / step).astype(int)
         gaps = rows > 1

@@ -13,7 +13,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from bushfit.errors import BushfitError, MeasurementError, did_you_mean
-from bushfit.reading.headers import WORDS
+from bushfit.reading.headers import ERRORS, WORDS
 
 #: Size of the largest file that is read [bytes]: three times that of a loop of 10 million rows.
 _LARGEST_BYTES = 1 << 30
@@ -47,6 +47,8 @@ _KNOWN_WORDS = frozenset(
 #: Cell that is written as the formula of its text, as in ="0.1"; line that is quoted as a whole.
 _QUOTED_CELL = re.compile(r'"?="+([^"\n]*)"+')
 _QUOTED_LINE = re.compile(r'^"([^"\n]*[;,\t][^"\n]*)"(?=[;,]*\r?$)', re.MULTILINE)
+#: Time at which a serial monitor received a line: "12:01:02.123 -> 1.2,3.4".
+_RECEIVED = re.compile(r"^(\d\d:\d\d:\d\d(?:[.,]\d+)?) -> ", re.MULTILINE)
 #: HTML entity such as &micro; and characters of UTF-8 that were decoded as cp1252.
 _ENTITY = re.compile(r"&(?:#\d{1,5}|[A-Za-z]{2,8}\d?);")
 _READ_AS_CP1252 = re.compile(r"[Â-ß][^\x00-\x7f]|[à-ï][^\x00-\x7f]{2}")
@@ -141,14 +143,7 @@ def read_utf8(
     """
     data = view_bytes(file, kind, largest=largest, hint=hint)
     if (bad := not_utf8(data)) is not None:
-        raise kind(
-            "the file is not UTF-8 text",
-            file=file,
-            place=line_of(data, bad),
-            found=f"byte 0x{data[bad]:02x}",
-            expected="text in UTF-8, with or without byte order mark",
-            hint="save it as UTF-8, or convert it: iconv -f LATIN1 -t UTF-8 old > new",
-        )
+        raise kind(**ERRORS["not_utf8"], file=file, place=line_of(data, bad), found=f"byte 0x{data[bad]:02x}")
     return data
 
 
@@ -223,12 +218,7 @@ def to_utf8(data: bytes, file: Path, stated_encoding: str | None = None) -> tupl
     except UnicodeError:  # UTF-16 or UTF-32 without a byte order mark
         raise _undecodable(data, file, 0, encoding) from None
     except LookupError:
-        raise MeasurementError(
-            "unknown encoding",
-            file=file,
-            found=f'"{stated_encoding}"',
-            expected='a name such as "utf-8", "utf-16", "cp1252", "latin-1" or "gb18030"',
-        ) from None
+        raise MeasurementError(**ERRORS["unknown_encoding"], file=file, found=f'"{stated_encoding}"') from None
     return _plain_bytes(b"".join(parts).removeprefix(codecs.BOM_UTF8)), encoding
 
 
@@ -243,7 +233,7 @@ def plain_text(text: str) -> str:
 
     Letters and digits of full or half width become plain ones, and HTML entities the characters they stand for; UTF-8
     that was read as cp1252 ("Âµ") is repaired, and quotation marks that keep a program from reading a cell or a whole
-    line, as in ="0.1", are dropped.
+    line, as in ="0.1", are dropped. The time before an arrow in the log of a serial monitor becomes a cell.
 
     Returns:
         The text, with as many lines.
@@ -252,6 +242,8 @@ def plain_text(text: str) -> str:
         text = _QUOTED_CELL.sub(r'"\1"', text)
         lines = _QUOTED_LINE.findall(text)
         text = _QUOTED_LINE.sub(r"\1", text) if 2 * len(lines) > text.count("\n") else text
+    if " -> " in text:
+        text = _RECEIVED.sub("\\1" + next((mark for mark in ";\t," if mark in text), " "), text)
     if "&" in text:
         text = _ENTITY.sub(lambda match: html.unescape(match[0]), text)
     if text.isascii():

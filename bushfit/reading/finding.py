@@ -1,10 +1,11 @@
 """Search for the table of a test in a file: its part, layout, columns and rows."""
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
-from bushfit.errors import MeasurementError, error_location
+from bushfit.errors import BushfitError, MeasurementError, error_location
 from bushfit.geometry import TRANSLATION, Motion
 from bushfit.reading.blocks import combine_blocks
 from bushfit.reading.classification import classify
@@ -13,7 +14,7 @@ from bushfit.reading.labelled import Rows, select_rows
 from bushfit.reading.layout import DELIMITERS, FileFormat, Layout, find_layout
 from bushfit.reading.parts import OpenedFile, open_file
 from bushfit.reading.reshape import reshape_table
-from bushfit.reading.roles import PAIRS, names_for_motion
+from bushfit.reading.roles import PAIRS, is_test, names_for_motion
 from bushfit.reading.source import RowSource, Sheet
 from bushfit.reading.table import Table
 from bushfit.reading.wide import unpivot
@@ -60,6 +61,12 @@ def find_table(
     ]
     if len(layouts) > 1:
         layouts = [entry for entry in layouts if len(vocabulary.roles(entry[1].headers) - {"time"}) > 1]
+    every_name = Vocabulary(ALL_COLUMNS, named, stated_units)
+    if len(opened.parts) > 1 and not any(is_test(every_name.roles(layout.headers)) for _, layout in layouts):
+        with suppress(BushfitError):  # the parts together are no test either
+            together = find_table(opened.join_sheets(), names, columns, stated_units, motion=motion, rows=rows)
+            if is_test(set(together.roles)):
+                return together
     if len(layouts) != 1:
         raise opened.part_error([source for source, _ in layouts])
     table = Table(opened, *layouts[0], names, motion)

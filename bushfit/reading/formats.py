@@ -1,12 +1,14 @@
-"""Recordings of MATLAB, HDF5, TDMS, MDF, Parquet and Arrow, as groups of channels.
+"""Recordings of MATLAB, HDF5, JSON, TDMS, MDF, Parquet and Arrow, as groups of channels.
 
 Each reader takes the bytes of a file and its path, imports its library when it is called, and yields groups. The unit
 of a channel is "" if the file does not state it.
 """
 
 import io
+import json
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -66,13 +68,44 @@ def _from_hdf5(node: Any) -> Any:
     return array if unit is None else {"Data": array, "Name": node.name.rpartition("/")[2], "Unit": unit}
 
 
+def read_json(data: bytes, _: Path) -> Iterator[Group]:
+    """Read the objects of a JSON file, or of a text with one object on each line, as channels.
+
+    An object may have a list for each channel; a list of objects has a row for each object. An object "units" states
+    the units of channels by their names.
+
+    Yields:
+        Title, channels and properties (name, value) of the file, then of each object.
+    """
+    text = data.decode("utf-8-sig")
+    try:
+        content = json.loads(text)
+    except json.JSONDecodeError:
+        content = [json.loads(line) for line in text.splitlines() if line.strip(" ,")]
+    yield from _in_struct("", _from_json({"": content}))
+
+
+def _from_json(node: Any) -> Any:
+    """Convert a value of a JSON file to the form that scipy returns for MATLAB: dicts, lists of dicts, and arrays."""
+    if isinstance(node, dict):
+        return {name: _from_json(value) for name, value in node.items()}
+    if not isinstance(node, list) or not all(isinstance(one, dict) for one in node):
+        return np.array(node) if isinstance(node, list) else node
+    if any(isinstance(value, list) for one in node for value in one.values()):
+        return [_from_json(one) for one in node]
+    names = dict.fromkeys(name for one in node for name in one)  # a row for each object
+    return {name: np.array([one.get(name, np.nan) for one in node]) for name in names}
+
+
 def _refuse_too_many(values: int) -> None:
     """Raise a ValueError if a compressed file would unpack to more values than any recording has."""
     if values > _MOST_VALUES:
         raise ValueError(f"the file unpacks to {values} values, of which at most {_MOST_VALUES} are read")
 
 
-def _in_struct(path: str, content: Mapping[str, Any]) -> Iterator[Group]:
+def _in_struct(
+    path: str, content: Mapping[str, Any], unit_of: Mapping[str, str] = MappingProxyType({})
+) -> Iterator[Group]:
     """Yield the vectors and matrix columns of a struct as a group of channels, then the groups of structs inside it.
 
     Scalars and texts of the struct are its properties. Cells with as many texts as a matrix has columns name the
@@ -81,7 +114,9 @@ def _in_struct(path: str, content: Mapping[str, Any]) -> Iterator[Group]:
     Args:
         path: name of the struct, which names the group.
         content: variables of the struct by name.
+        unit_of: units of channels, by name, that a struct "units" around it states.
     """
+    unit_of = content["units"] if isinstance(content.get("units"), Mapping) else unit_of
     fields = {name: value for name, value in content.items() if not name.startswith("__")}
     for name in [f"{name.removesuffix('_Data')}_Header" for name in fields if name.endswith("_Data")]:
         if isinstance(header := fields.pop(name, None), Mapping):  # of a channel, as catman writes it
@@ -95,9 +130,9 @@ def _in_struct(path: str, content: Mapping[str, Any]) -> Iterator[Group]:
     of_rows = {
         n: one for n, one in arrays.items() if one.ndim == 1 and (one.dtype.kind not in "UO" or one.size != columns)
     }
-    channels = [Channel(*one) for one in of_rows.items()]
+    channels = [Channel(*one, str(unit_of.get(one[0], ""))) for one in of_rows.items()]
     levels = [one for one in channels if one.values.dtype.kind in "fiu" and len(one.values) == columns != rows]
-    labels = [(name, str(value)) for name, value in fields.items() if isinstance(value, str | float | int | np.number)]
+    labels = [(name, str(value)) for name, value in fields.items() if isinstance(value, str | float | np.number | int)]
     inner = dict[str, Mapping[str, Any]]()
     for name, value in fields.items():
         place = f"{path}.{name}" if path else name
@@ -128,7 +163,7 @@ def _in_struct(path: str, content: Mapping[str, Any]) -> Iterator[Group]:
             channels += [Channel(*column) for column in zip(names, value.T, strict=True)]
         yield path, channels, labels
     for place, struct in inner.items():
-        yield from _in_struct(place, struct)
+        yield from _in_struct(place, struct, unit_of)
 
 
 def _column_names(rows: NDArray[Any]) -> list[str]:

@@ -16,6 +16,8 @@ from bushfit import units
 WORDS: dict[str, dict[str, Any]] = tomllib.loads(Path(__file__).with_name("words.toml").read_text(encoding="utf-8"))
 #: Next steps that errors suggest, by what is missing.
 HINTS: Mapping[str, str] = WORDS.pop("hints")
+#: Arguments of errors whose texts do not depend on the file (problem, expected, hint), by what is wrong.
+ERRORS: Mapping[str, dict[str, Any]] = WORDS.pop("errors")
 
 
 def _expand(name: str) -> list[str]:
@@ -127,8 +129,8 @@ _SPELLINGS: dict[int, int | str] = {
 }
 #: End of a name before a unit without brackets: "force_N", "Kraft in N", "F / kN", "load, N".
 _NAME_END = re.compile(r"\s+in\s+|\s*/\s*|\s*,\s*|\s+|_")
-#: Newton per a length in a name without capitals: "n_per_mm"; and the word before a part of such a unit.
-_PER_OF_NEWTON, _PER = re.compile(r"(?<![^\W_])(k?)n[ _]per[ _]"), re.compile(r"(?<![^\W_])per$")
+#: Newton per a length in a name without capitals: "n_per_mm" or "n_mm"; and the word before a part of such a unit.
+_PER_OF_NEWTON, _PER = re.compile(r"(?<![^\W_])(k?)n[ _](?:per[ _])?(?=m)"), re.compile(r"(?<![^\W_])per$")
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from bushfit.errors import MeasurementError
-from bushfit.reading.formats import read_arrow, read_matlab, read_mdf, read_tdms
+from bushfit.reading.formats import read_arrow, read_json, read_matlab, read_mdf, read_tdms
 from bushfit.reading.headers import HINTS, LOOP_COLUMNS, SWEEP_COLUMNS, Vocabulary
 from bushfit.reading.layout import Layout
 from bushfit.reading.lines import Line
@@ -57,6 +57,7 @@ class Format(NamedTuple):
 _FORMATS = (
     Format("MATLAB", (".mat",), rb"MATLAB (?:5\.0|7\.3) MAT-file", read_matlab, HINTS["matlab"]),
     Format("HDF5", (".h5", ".hdf5"), rb"\x89HDF", read_matlab),
+    Format("JSON", (".ndjson", ".jsonl"), rb"(?:\xef\xbb\xbf)?\s*[\[{]\s*[\"\[{]", read_json),
     Format("TDMS", (".tdms",), rb"TDSm", read_tdms),
     Format("UFF", (".uff", ".unv"), rb" {4}-1 *\r?\n +\d+", read_uff, HINTS["uff"]),
     Format("MDF", (".mf4", ".mdf"), rb"MDF     |UnFinMF ", read_mdf),
@@ -69,26 +70,12 @@ RECORDINGS = tuple(ending for one in _FORMATS for ending in one.endings)
 
 def word_for_part(file: Path) -> str:
     """Word for a part of a file in messages: "group" for a recording, "sheet" for a workbook."""
-    return "group" if file.suffix.lower() in RECORDINGS else "sheet"
+    return "group" if file.suffix.lower() in (".json", *RECORDINGS) else "sheet"
 
 
-def format_of(data: bytes, file: Path) -> Format | None:
-    """Return the format of a recording or workbook, identified by its first bytes; None for a text.
-
-    Raises:
-        MeasurementError: the file has the ending of a recording, but not its content.
-    """
-    by_content = next((recording for recording in _FORMATS if re.match(recording.sign, data)), None)
-    by_ending = next((recording for recording in _FORMATS if file.suffix.lower() in recording.endings), None)
-    if by_ending and not by_content:
-        raise MeasurementError(
-            f"this is not a {by_ending.name} file",
-            file=file,
-            found="the first bytes of another format",
-            expected=f"a {by_ending.name} file, according to its extension {file.suffix}",
-            hint="export it again, or rename it with the correct extension, such as .csv",
-        )
-    return by_content
+def format_of(data: bytes) -> Format | None:
+    """Return the format of a recording or workbook, identified by its first bytes; None for a text."""
+    return next((recording for recording in _FORMATS if re.match(recording.sign, data)), None)
 
 
 @lru_cache(maxsize=1)

@@ -21,7 +21,8 @@ from bushfit.reading.channel_lists import listed_names, scales_above
 from bushfit.reading.headers import WORDS, Vocabulary, plain, plain_name, split_unit
 from bushfit.reading.lines import MOST_COLUMNS, Content, Line, is_comment, is_row, is_units_row, split
 from bushfit.reading.numerals import is_like_number, plainest_value
-from bushfit.reading.roles import UNIT_NAMES, is_test, is_unit_alone, stated_once
+from bushfit.reading.roles import UNIT_NAMES, X_UNIT_NAMES, is_test, is_unit_alone, stated_once
+from bushfit.reading.times import parse_clock
 
 #: Characters that separate columns, by their names in a campaign, in the order in which they are tried.
 DELIMITERS = {"semicolon": ";", "tab": "\t", "pipe": "|", "comma": ",", "caret": "^", "blanks": " "}
@@ -288,7 +289,7 @@ def _layout(
         headers: header cells.
     """
     number, width = lines[index].number, len(headers)
-    if all(is_like_number(cell) for cell in headers) and width > 1:
+    if all(is_like_number(cell) or parse_clock(cell) is not None for cell in headers) and width > 1:
         names = tuple(str(column) for column in range(1, width + 1))
         return Layout(delimiter, names, number, ("",) * width, None, headerless=True)
     layout = Layout(delimiter, tuple(headers), number, ("",) * width, None)
@@ -350,10 +351,15 @@ def _with_units(layout: Layout, lines: Sequence[Line], index: int, vocabulary: V
     below = list(_below(lines, index, layout.delimiter))
     descriptions = _descriptions(below, layout.delimiter, len(headers))
     layout = replace(layout, described_line=descriptions[-1].number if descriptions else 0)
-    for line in (*descriptions, *reversed(above)):
-        cells = split(line.content, layout.delimiter)
+    rows = [(line.number, split(line.content, layout.delimiter)) for line in (*descriptions, *reversed(above))]
+    first = rows[len(descriptions) - 1][1][0] if descriptions else ""
+    if plain(headers[0]) in _DESCRIPTIONS and (heading := vocabulary.heading(first)):  # below the names of the channels
+        x_units = (cells[1] for _, cells in rows if len(cells) > 1 and plain(cells[0]) in X_UNIT_NAMES)
+        headers = (f"{first} [{x_unit}]" if (x_unit := next(x_units, "")) and not heading.unit else first, *headers[1:])
+        layout = replace(layout, headers=headers)
+    for number, cells in rows:
         if 1 < len(cells) <= len(headers) and plain(cells[0]) in UNIT_NAMES and is_units_row(cells[1:]):
-            return replace(layout, units_line=line.number, units=("", *cells[1:], *empty)[: len(headers)])
+            return replace(layout, units_line=number, units=("", *cells[1:], *empty)[: len(headers)])
     directly_above = split(above[-1].content, layout.delimiter) if above else []
     if len(directly_above) == len(headers) and all(is_units_row([cell]) for cell in directly_above):
         return replace(layout, units=tuple(cell.strip("[]() ") for cell in directly_above))
@@ -386,7 +392,8 @@ def _with_unnamed_columns(layout: Layout, below: Sequence[Sequence[str]]) -> Lay
     headers, row = layout.headers, layout.units
     rows = [cells for cells in below if is_row(cells)]
     widths = {len(cells) for cells in rows}
-    if layout.described_line and widths == {len(headers) - 1}:  # the names of the descriptions have their own column
+    has_keyword = layout.described_line or plain(headers[0]) in _DESCRIPTIONS
+    if has_keyword and widths == {len(headers) - 1}:  # the names of the descriptions have their own column
         return replace(layout, headers=headers[1:], units=row[1:])
     may_be_decimal = layout.delimiter == "," and not any("." in cell for cells in below for cell in cells)
     if len(widths) != 1 or not len(headers) < (width := widths.pop()) < 2 * len(headers) or may_be_decimal:

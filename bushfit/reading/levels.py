@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from bushfit.errors import UnitError
 from bushfit.geometry import Direction, Motion, Place
-from bushfit.reading.headers import Column
+from bushfit.reading.headers import ERRORS, Column
 from bushfit.reading.labelled import column_texts
 from bushfit.reading.measurement import FEWEST_LOOP_ROWS, SAME_TEMPERATURE, Floats
 from bushfit.reading.numerals import Numerals
@@ -110,14 +110,8 @@ class ConditionColumn:
         if not any(np.ptp(level[rows][point]) > 0 for point in group_rows(*keys)):
             return [rows]
         if not self.unit:
-            raise self.table.header_error(
-                "the preload has no unit",
-                kind=UnitError,
-                column=self.column,
-                found=", ".join(self.text(group).strip() for group in groups),
-                expected="a displacement or a force, such as mm or N",
-                hint='units = { preload = "N" } in the campaign, or units = { preload = "mm" }',
-            )
+            found, error = ", ".join(self.text(group).strip() for group in groups), ERRORS["preload_without_unit"]
+            raise self.table.header_error(**error, kind=UnitError, column=self.column, found=found)
         return groups
 
     def select(self, rows: NDArray[np.intp], points: Iterable[Floats], stated: float | None) -> NDArray[np.intp]:

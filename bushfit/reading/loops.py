@@ -10,7 +10,7 @@ from bushfit.caveat import Caveat
 from bushfit.geometry import ROTATION, Place
 from bushfit.reading.block_labels import note_coupon
 from bushfit.reading.finding import find_table
-from bushfit.reading.headers import HINTS, LOOP_COLUMNS, Column, Vocabulary
+from bushfit.reading.headers import ERRORS, HINTS, LOOP_COLUMNS, Column, Vocabulary
 from bushfit.reading.labelled import Rows, note_not_understood
 from bushfit.reading.levels import rows_of_test
 from bushfit.reading.measurement import FEWEST_LOOP_ROWS, Floats, Loop
@@ -70,12 +70,8 @@ def read_loop(
     if displacement @ force < displacement.sum() * force.sum() / force.size:  # a negative covariance
         sentence = f'"{wanted["force"].header}" falls where "{wanted["displacement"].header}" rises'
         if test.force_sign is not None:
-            raise table.error(
-                "the force falls where the displacement rises",
-                column=wanted["force"],
-                expected="force and displacement counted in the same direction",
-                hint=f"take force_sign = {test.force_sign} out of the campaign",
-            )
+            hint = f"take force_sign = {test.force_sign} out of the campaign"
+            raise table.error(**ERRORS["falling_force"], column=wanted["force"], hint=hint)
         values["force"] = force = -force
         notes += (Caveat("reversed_force", f"{sentence}: the force has the opposite sign and is turned"),)
     if "time" in values:
@@ -119,13 +115,9 @@ def loop_columns(table: Table, direction: Place, test: LoopFile) -> dict[str, Co
     swapped = {"displacement": direction.motion.force_unit, "force": direction.motion.displacement_unit}
     if all(table.agrees(role, unit) for role, unit in swapped.items()):
         displacement, force = (table.roles[role].header for role in ("displacement", "force"))
-        raise table.header_error(
-            "displacement and force are swapped",
-            found=f'"{displacement}" and "{force}"',
-            expected="a displacement in units of displacement, and a force in units of force",
-            hint="correct the header, or name the columns in the campaign: columns = "
-            f'{{ displacement = "{force}", force = "{displacement}" }}',
-        )
+        keys = f'{{ displacement = "{force}", force = "{displacement}" }}'
+        hint = f"correct the header, or name the columns in the campaign: columns = {keys}"
+        raise table.header_error(**ERRORS["swapped_columns"], found=f'"{displacement}" and "{force}"', hint=hint)
     wanted = {role: si_column(table, role, direction) for role in ("displacement", "force")}
     wanted["force"] = replace(wanted["force"], scale=(test.force_sign or 1) * wanted["force"].scale)
     if "time" in table.roles and not test.states_time:

@@ -25,6 +25,7 @@ from bushfit.reading.headers import (
     split_convention,
 )
 from bushfit.reading.lines import Line
+from bushfit.reading.roles import X_UNIT_NAMES
 
 #: Usual spelling of the units in names, by their spelling in lower case.
 _UNITS = {spelling: unit for unit, spellings in WORDS["units_in_names"].items() for spelling in spellings}
@@ -61,8 +62,8 @@ _TEMPERATURES = (-100.0, 300.0)
 #: Key of a campaign by each of its usual names above a table.
 _STATED_ABOVE = {**WORDS["above"], "direction": WORDS["rows"]["direction"], "preload": SWEEP_COLUMNS["preload"]}
 _KEY_OF = {plain(name): key for key, names in _STATED_ABOVE.items() for name in names}
-#: Names of the step between rows, whose unit is that of the x axis, and names of this unit.
-_STEPS, _X_UNITS = (frozenset(map(plain, WORDS["rows_of"][key])) for key in ("steps", "x_units"))
+#: Names of the step between rows, whose unit is that of the x axis.
+_STEPS = frozenset(map(plain, WORDS["rows_of"]["steps"]))
 #: SI unit of the two keys for the time between rows.
 _SAMPLING = {"sampling_rate": "Hz", "sampling_interval": "s"}
 #: Usual names of amplitude and frequency above a table.
@@ -231,7 +232,8 @@ def labels_above(lines: Iterable[Line]) -> Labels:
     conventions = {found for line in lines if (found := _convention_in_line(line))}
     convention = conventions.pop() if len(conventions) == 1 else None
     rows = map(_name_and_values, lines)
-    x_unit = next((row[1] for row in rows if len(row) > 1 and plain(row[0]) in _X_UNITS and units.is_unit(row[1])), "s")
+    x_units = (row[1] for row in rows if len(row) > 1 and plain(row[0]) in X_UNIT_NAMES)
+    x_unit = next(filter(units.is_unit, x_units), "s")
     parts = [Line(line.number, part) for line in lines for part in (line.content, *_PARTS_OF_LINE.split(line.text))]
     labels = reduce(or_, (_label_in_line(line, x_unit) for line in parts), Labels(convention=convention))
     return labels | Labels(specimen_number=labels.part_number)

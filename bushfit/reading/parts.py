@@ -1,21 +1,26 @@
 """Parts of a file that can contain a table: the text, worksheets of a workbook, or groups of recorded channels."""
 
+import re
 from collections.abc import Sequence
 from concurrent.futures import Future
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from bushfit.errors import MeasurementError, did_you_mean
 from bushfit.reading.files import join_quoted, sha256, to_utf8, unpack_gzip, view_bytes
+from bushfit.reading.headers import WORDS
 from bushfit.reading.instruments import format_of, read_parts, word_for_part
 from bushfit.reading.layout import FileFormat
-from bushfit.reading.source import RowSource, Text
+from bushfit.reading.source import RowSource, Sheet, Text
 
-#: First bytes of web pages, which some programs save as .xls, and the number of bytes that are searched for them.
-_WEB_PAGES, _FIRST_BYTES = (b"<html", b"<!doctype html", b"<table"), 100
+#: Texts without a table of a test: pattern, description and next step; and the number of bytes that are searched.
+_NO_TABLES = [(re.compile(pattern, re.IGNORECASE), *texts) for pattern, *texts in WORDS["no_tables"].values()]
+_FIRST_BYTES = 2000
 #: Largest number of parts that an error lists; chosen: a line or two.
 _MOST_LISTED = 12
+#: Largest number of characters that an error quotes.
+_LONGEST_QUOTE = 40
 _ONE_GROUP = "put all channels of a test into one group, and resample channels of another rate or length"
 
 
@@ -36,6 +41,11 @@ class OpenedFile:
     stated: FileFormat
     parts: Sequence[RowSource]
     located: dict[object, Any] = field(default_factory=dict)
+
+    def join_sheets(self) -> "OpenedFile":
+        """Return the workbook as one sheet, with the rows of each sheet below its name, as blocks of one table."""
+        content = [row for part in self.parts if isinstance(part, Sheet) for row in ([part.sheet], *part.content)]
+        return replace(self, parts=[Sheet("", content)], located={})
 
     def part_error(self, usable: Sequence[RowSource]) -> MeasurementError:
         """Return the error for a file in which no part, or more than one (`usable`), can contain the table."""
@@ -60,16 +70,18 @@ def open_file(file: Path, file_format: FileFormat) -> OpenedFile:
     """
     packed, name = view_bytes(file, MeasurementError), file_format.sheet
     checksum, data = sha256(packed), unpack_gzip(packed, file)
-    recording = format_of(data, file)
+    recording = format_of(data)
     parts = read_parts(data, file, recording) if recording else ()
     if not parts and name:
         expected = "a workbook, or a file with groups of channels"
         raise MeasurementError("this is not a workbook", file=file, found=f'sheet = "{name}"', expected=expected)
-    if data[:_FIRST_BYTES].lstrip(b"\xef\xbb\xbf \t\r\n").lower().startswith(_WEB_PAGES):
-        advice = "open it in a spreadsheet program, and save it as xlsx or CSV"
-        raise MeasurementError("this is a web page", file=file, found="HTML", expected="a table", hint=advice)
     if not parts:
         text, encoding = to_utf8(data, file, file_format.encoding)
+        head = text[:_FIRST_BYTES].decode("utf-8", "replace")
+        for pattern, kind, advice in _NO_TABLES:
+            if match := pattern.search(head):
+                found = " ".join(match[0].split())[-_LONGEST_QUOTE:]
+                raise MeasurementError(f"this is {kind}", file=file, found=found, expected="a table", hint=advice)
         return OpenedFile(file, checksum, file_format, [Text(join_quoted(text), encoding)])
     chosen = [part for part in parts if (part.is_visible if name is None else part.sheet == name)]
     if not chosen:

@@ -12,13 +12,16 @@ from collections.abc import Sequence
 from itertools import islice, zip_longest
 from typing import NamedTuple
 
+import numpy as np
+
 from bushfit import units
+from bushfit.errors import MeasurementError
 from bushfit.reading.blocks import find_segments
 from bushfit.reading.headers import WORDS, Vocabulary, plain
 from bushfit.reading.layout import Layout
 from bushfit.reading.lines import Line, is_row
 from bushfit.reading.measurement import FEWEST_LOOP_ROWS
-from bushfit.reading.numerals import is_like_number
+from bushfit.reading.numerals import is_like_number, plainest_value
 from bushfit.reading.roles import UNIT_NAMES, is_test
 from bushfit.reading.source import Channels, RowSource, Sheet, cells_of
 
@@ -31,6 +34,8 @@ _PAIR = re.compile(
     r"(?<![^\s,;(\[])([^\W\d][^\s=,;]{0,60})\s?=\s?"
     r"([+-]?\d(?:[\d.,eE+-]*\d)?(?:\s?[^\s\d=,;][^\s=,;]*(?![^\s,;]))?)"
 )
+#: Relative difference up to which two curves of a picture have the same x; chosen: clicks are less exact than tables.
+_SAME_X = 0.01
 #: First rows that show whether a column names quantities; chosen: more than a test has channels.
 _FIRST_ROWS = 50
 
@@ -59,6 +64,7 @@ def reshape_table(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> 
         return None
     return (
         _spread_pairs(source, vocabulary)
+        or _name_curves(source, layout)
         or _exchange_rows(source, layout, vocabulary)
         or _spread_names(source, layout, vocabulary)
         or _join_blocks(source, layout, vocabulary)
@@ -74,6 +80,24 @@ def _spread_pairs(source: RowSource, vocabulary: Vocabulary) -> Sheet | None:
     above = [[line.text] for line, pairs in zip(source.head, found, strict=True) if len(pairs) < 2]
     rows = [[text for _, text in _PAIR.findall(line.text)] for line in source.lines(0)]
     return Sheet(source.sheet or "", [*above, names, *(row for row in rows if len(row) == len(names))])
+
+
+def _name_curves(source: RowSource, layout: Layout) -> Sheet | None:
+    """Name the curves of a digitized picture, whose names stand above their columns X and Y, and keep one column X.
+
+    Raises:
+        MeasurementError: the curves have different x values.
+    """
+    names, axes = ([*map(str, cells_of(line, layout.delimiter)), ""] for line in (*source.head, *source.head)[:2])
+    if len(axes) < 5 or [plain(axis) for axis in axes[:-1]] != ["x", "y"] * (len(axes) // 2):
+        return None
+    rows = [list(map(str, cells_of(line, layout.delimiter))) for line in source.lines(source.head[1].number)]
+    curves = [[plainest_value(row[n]) for row in rows if len(row) > n] for n in range(0, len(axes) - 1, 2)]
+    if not all(len(x) == len(curves[0]) and np.allclose(x, curves[0], rtol=_SAME_X) for x in curves):
+        problem, expected = "each curve of this file has its own x values", "the same x values in all curves"
+        hint = "interpolate the curves at common x values, and write a table with a column for each"
+        raise MeasurementError(problem, found=", ".join(filter(None, names)), expected=expected, hint=hint)
+    return Sheet("", [["X", *names[:-1:2]], *([row[0], *row[1::2]] for row in rows)])
 
 
 def _spread_names(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> Sheet | None:

@@ -6,8 +6,8 @@ from bushfit import units
 from bushfit.geometry import STRAINING, Motion
 from bushfit.reading.headers import STRAINING_COLUMNS, SWEEP_COLUMNS, WORDS, Vocabulary, plain, split_convention
 
-#: First cells of a row of units, such as "Unit".
-UNIT_NAMES = frozenset(map(plain, WORDS["rows_of"]["units"]))
+#: First cells of a row of units, such as "Unit", and of a row with the unit of the x axis.
+UNIT_NAMES, X_UNIT_NAMES = (frozenset(map(plain, WORDS["rows_of"][key])) for key in ("units", "x_units"))
 #: Names of columns in a test of strain and modulus, by role; they replace those of loops and sweeps.
 _STRAINING = STRAINING_COLUMNS | {"amplitude": SWEEP_COLUMNS["amplitude"] + STRAINING_COLUMNS["amplitude"]}
 #: Roles whose names depend on the motion: displacement or strain, force or stress, stiffness or modulus.

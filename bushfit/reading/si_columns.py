@@ -150,7 +150,7 @@ def columns_key(table: Table, role: str, unit: str) -> str:
         return f"{key} if this cell carries the load alone, or write the sum into a column if both share the load"
     if fitting or volts:
         return key if fitting else f'{key}, and the size of one volt: units = {{ {role} = "... {example}" }}'
-    is_named = any(map(with_unit.heading, filter(None, table.headers)))
+    is_named = any(with_unit.heading(header) for header, _ in unused)
     return f'units = {{ {role} = "{example}" }}' if is_named else key
 
 

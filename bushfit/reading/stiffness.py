@@ -8,7 +8,7 @@ import numpy as np
 
 from bushfit import units
 from bushfit.caveat import Caveat
-from bushfit.reading.headers import HINTS, Column, Vocabulary
+from bushfit.reading.headers import ERRORS, HINTS, Column, Vocabulary
 from bushfit.reading.measurement import Complex, Floats
 from bushfit.reading.roles import AGREEING_PAIRS, CONVERSIONS, OF_MOTION, PAIRS
 from bushfit.reading.si_columns import refuse_other_motion
@@ -64,12 +64,8 @@ def refuse_ambiguous_damping(table: Table) -> None:
     if damping and {"stiffness", "storage_stiffness", "force_amplitude"} & set(table.roles):
         keys = (f'columns = {{ {role} = "{damping}" }}' for role in ("loss_factor", "damping_ratio"))
         coefficient = f'columns = {{ damping_coefficient = "{damping}" }}'
-        raise table.header_error(
-            "this damping can be a loss factor or a damping ratio, which is half as large",
-            found=f'"{damping}"',
-            expected="one of them, or a damping coefficient in N s/mm",
-            hint=f"{' or '.join(keys)} or {coefficient} in the campaign",
-        )
+        hint = f"{' or '.join(keys)} or {coefficient} in the campaign"
+        raise table.header_error(**ERRORS["ambiguous_damping"], found=f'"{damping}"', hint=hint)
 
 
 def convert_values(

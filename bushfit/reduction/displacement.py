@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from bushfit.caveat import Caveat
 from bushfit.errors import MeasurementError, error_location
 from bushfit.reading.displacements import FEWEST_ROWS, DisplacementHistory, even_time
+from bushfit.reading.headers import ERRORS
 from bushfit.reading.measurement import Loop
 from bushfit.reduction.arrays import difference_noise
 from bushfit.units import number
@@ -138,13 +139,8 @@ def _require_cycle(channel: DisplacementHistory) -> None:
     if abs(motion[-1] - motion[0]) > jump:
         unit, factor = channel.direction.display.displacement
         first, last = (f"{number(factor * end, 4)} {unit}" for end in (motion[0], motion[-1]))
-        raise MeasurementError(
-            "a steady state needs whole cycles",
-            place=str(channel.direction),
-            found=f"{first} at the start, {last} at the end",
-            expected="a history that ends where it begins",
-            hint="cut the history to whole cycles, or leave --steady out",
-        )
+        found = f"{first} at the start, {last} at the end"
+        raise MeasurementError(**ERRORS["incomplete_cycles"], place=str(channel.direction), found=found)
 
 
 def _smooth_displacement(channel: DisplacementHistory, frequency: float, *, steady: bool) -> DisplacementHistory:
@@ -161,12 +157,9 @@ def _smooth_displacement(channel: DisplacementHistory, frequency: float, *, stea
     lowest, nyquist = 1.0 / (channel.step * channel.displacement.size), 0.5 / channel.step
     if not lowest <= frequency < nyquist:
         low, high = number(lowest, 4), number(nyquist, 4)
-        raise MeasurementError(
-            "the low-pass does not suit the history",
-            place="lowpass",
-            found=f"{number(frequency, 4)} Hz",
-            expected=f"at least {low} Hz (one cycle in the history) and below {high} Hz (half of the sampling rate)",
-        )
+        found, problem = f"{number(frequency, 4)} Hz", "the low-pass does not suit the history"
+        expected = f"at least {low} Hz (one cycle in the history) and below {high} Hz (half of the sampling rate)"
+        raise MeasurementError(problem, place="lowpass", found=found, expected=expected)
     from scipy.signal import butter, sosfiltfilt
 
     motion, sections = channel.displacement, butter(_ORDER, frequency, fs=1.0 / channel.step, output="sos")

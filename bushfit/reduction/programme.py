@@ -12,6 +12,7 @@ from itertools import chain
 import numpy as np
 
 from bushfit.errors import NoTestError
+from bushfit.reading.headers import ERRORS
 from bushfit.reading.measurement import Floats, Loop, RecordPart
 from bushfit.reading.stated import LoopFile
 from bushfit.reduction.cycles import lone_outliers, resumes_in_phase, shifted_difference, stretches
@@ -151,15 +152,10 @@ def steady_spans(loop: Loop, time: Floats, motion: Floats) -> list[SteadySpan]:
         unit, factor = loop.direction.display.displacement
         low, high = factor * inner.min() / 2.0, factor * inner.max() / 2.0
         periods = time[turns[3:-1]] - time[turns[1:-3]]
-        raise NoTestError(
-            "no part of the record is a loop",
-            file=loop.source.file if loop.source else loop.name,
-            found=f"{inner.size / 2.0:.2g} cycles from {low:.3g} to {high:.3g} {unit} and from {periods.min():.3g} to "
-            f"{periods.max():.3g} {'s' if loop.has_recorded_time else 'rows'}, "
-            f"{'few' if spans else 'no two'} successive ones equal",
-            expected="at least two cycles of one amplitude and rate",
-            hint="record five cycles of each amplitude; for a road load, use bushfit respond or [[validation]]",
-        )
+        found = f"{inner.size / 2.0:.2g} cycles from {low:.3g} to {high:.3g} {unit} and from {periods.min():.3g} to "
+        found += f"{periods.max():.3g} {'s' if loop.has_recorded_time else 'rows'}, "
+        found += f"{'few' if spans else 'no two'} successive ones equal"
+        raise NoTestError(**ERRORS["no_loop"], file=loop.source.file if loop.source else loop.name, found=found)
     return []
 
 

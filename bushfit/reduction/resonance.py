@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from bushfit.caveat import Caveat
 from bushfit.errors import MeasurementError
+from bushfit.reading.headers import ERRORS
 from bushfit.reading.measurement import Complex, Floats, Sweep
 from bushfit.reading.resonance import ResonanceTest
 from bushfit.reading.stiffness import LEAST_LOSS_FACTOR
@@ -186,12 +187,10 @@ def reduce_resonance(test: ResonanceTest, mass: float) -> Resonance:
         error[moving] = around / np.abs(thinned[moving] - 1.0)
     is_kept = (error <= LARGEST_ERROR) & (stiffness.real > 0.0)
     if not is_kept.any():
+        expected = f"a standard error of K of at most {100 * LARGEST_ERROR:g} % somewhere"
+        found = f"{100 * error.min():.3g} % at best"
         raise MeasurementError(
-            "no point of this test determines the stiffness",
-            file=test.source.file,
-            found=f"{100 * error.min():.3g} % at best",
-            expected=f"a standard error of K of at most {100 * LARGEST_ERROR:g} % somewhere",
-            hint="sweep through the resonance, or check the accelerations, which scatter",
+            **ERRORS["undetermined_stiffness"], file=test.source.file, found=found, expected=expected
         )
     points = frequency[is_kept], amplitude[is_kept], stiffness[is_kept], error[is_kept], rows[is_kept]
     return Resonance(test, mass, turned, *points, left_out=frequency[~is_kept])
@@ -214,23 +213,13 @@ def counts_phases_backwards(test: ResonanceTest) -> bool:
     share = float(np.sum(weight[flexibility.imag < 0.0]))
     loss = -float(np.sum(weight * np.sin(np.angle(flexibility))))
     if max(share, 1.0 - share) < _CLEAR_SHARE or abs(loss) < LEAST_LOSS_FACTOR:
-        raise MeasurementError(
-            "the phases show no positive loss with either sign",
-            file=test.source.file,
-            found=f"a mean loss factor of {loss:.2g}, above zero in {100 * share:.0f} % of the points that the "
-            "test determines",
-            expected="a mass that lags behind the base through the whole resonance",
-            hint="check that the unit of the phases (deg or rad) is right, and that the phases belong to base and mass",
-        )
+        found = f"a mean loss factor of {loss:.2g}, above zero in {100 * share:.0f} % of the points that the test "
+        found += "determines"
+        raise MeasurementError(**ERRORS["no_positive_loss"], file=test.source.file, found=found)
     positive = float(np.sum(weight[flexibility.real > 0.0]))
     if positive < _CLEAR_SHARE:
-        raise MeasurementError(
-            "the stiffness is negative",
-            file=test.source.file,
-            found=f"a stiffness above zero in {100 * positive:.0f} % of the points that the test determines",
-            expected="a mass that moves with the base at low frequency, and more around the resonance",
-            hint="check that base and mass are not swapped, and that no phase is off by 180 deg",
-        )
+        found = f"a stiffness above zero in {100 * positive:.0f} % of the points that the test determines"
+        raise MeasurementError(**ERRORS["negative_stiffness"], file=test.source.file, found=found)
     return loss < 0.0
 
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from bushfit.errors import MeasurementError
 from bushfit.geometry import Place
 from bushfit.progress import track
+from bushfit.reading.headers import ERRORS
 from bushfit.reading.measurement import Complex, Floats, Loop
 from bushfit.reduction.arrays import median_and_scatter
 from bushfit.reduction.cycles import (
@@ -75,14 +76,11 @@ def reduce(histories: Sequence[Loop], *, fewest_cycles: int = FEWEST_CYCLES, lev
         steps += found
         skipped += rejected
     if not steps:
-        raise MeasurementError(
-            "no steady sine was found",
-            file=histories[0].source.file if histories[0].source else histories[0].name,
-            found="; ".join(f"{skip.start:.4g} to {skip.end:.4g} s: {skip.why}" for skip in skipped[:3])
-            or "a displacement that does not oscillate",
-            expected=f"a stepped sine with at least {fewest_cycles} whole cycles at one frequency and amplitude",
-            hint="a slow loop needs no reduction: list the file under [[loops]]",
-        )
+        file = histories[0].source.file if histories[0].source else histories[0].name
+        why = "; ".join(f"{skip.start:.4g} to {skip.end:.4g} s: {skip.why}" for skip in skipped[:3])
+        why = why or "a displacement that does not oscillate"
+        expected = f"a stepped sine with at least {fewest_cycles} whole cycles at one frequency and amplitude"
+        raise MeasurementError(**ERRORS["no_steady_sine"], file=file, found=why, expected=expected)
     direction = histories[0].direction
     return Reduction(direction, tuple(group_steps(steps, levels, direction)), tuple(skipped), outliers)
 
