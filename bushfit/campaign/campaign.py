@@ -5,6 +5,7 @@ import os
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ from bushfit.campaign.copies import without_copied_loops, without_copied_points
 from bushfit.campaign.quantities import Compound, EffectsSettings, ReportSettings, embed_logo
 from bushfit.campaign.schema import CampaignFile, FitSettings, ParameterSetting, PredictSettings, RigSettings
 from bushfit.campaign.simulated import SimulateSettings
+from bushfit.campaign.strain import with_strain_checked
 from bushfit.campaign.toml import parse_toml
 from bushfit.caveat import join_names
 from bushfit.effects import effect_name_of, place_suffix, with_base
@@ -23,7 +25,8 @@ from bushfit.model.laws import register_file
 from bushfit.model.model import FIVE, Model
 from bushfit.model.transfer import FACTOR_SPREAD
 from bushfit.progress import track
-from bushfit.reading.headers import ZERO_TO_PEAK, split_convention
+from bushfit.reading.finding import direction_of_table, find_table
+from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS, ZERO_TO_PEAK, split_convention
 from bushfit.reading.instruments import RECORDINGS
 from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import AnyTest, Loop, Sweep
@@ -118,8 +121,9 @@ def load_campaign(path: str | Path) -> Campaign:
         track(f"{kind} read", reader_keywords(path, tests, [*islice(names, len(tests))], specimens), len(tests))
         for kind, tests in (("loops", content.loops), ("sweeps", content.sweeps), ("records", content.validation))
     )
-    all_loops = [loop for keywords in loops for loop in split_record(read_loop(**keywords), keywords["test"])]
-    all_sweeps = [read_sweep(**keywords) for keywords in sweeps]
+    check = partial(with_strain_checked, bushing=bushing)
+    all_loops = [check(loop) for keywords in loops for loop in split_record(read_loop(**keywords), keywords["test"])]
+    all_sweeps = [check(read_sweep(**keywords)) for keywords in sweeps]
     tests: list[Loop | Sweep] = [*all_loops, *all_sweeps]
     units = {test.direction: test.preload.unit for test in tests if test.preload and test.preload.value}
     several = join_names(table.name for table in content.bushings)
@@ -295,6 +299,10 @@ def reader_keywords(
         listed_tests.add(identity)
         shared = counts[source] > 1
         keywords: dict[str, Any] = {"file": path.parent / test.file, "test": test, "name": name, "shared": shared}
+        if test.direction is None and test.specimen is None:
+            names_of = SWEEP_COLUMNS if isinstance(test, SweepFile) else LOOP_COLUMNS
+            table = find_table(keywords["file"], names_of, test.columns, test.units, test)
+            keywords["test"] = test = replace(test, direction=direction_of_table(table))
         with error_location(path, place=test.file):
             keywords["direction"] = body = place_tested(vars(test), specimens)
             if isinstance(test, SweepFile) and (amplitude := test.at_amplitude):

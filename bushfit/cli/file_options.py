@@ -25,7 +25,7 @@ STATED: dict[str, dict[str, Any]] = {key: table for group in _TABLES.values() fo
 #: Files that are not test files: bytes that they begin with, and description, by extension.
 _NO_TESTS = {
     ".toml": (rb"", "a campaign or another TOML file"),
-    ".json": (rb'{\s*"schema": "bushfit/', "a result of bushfit"),
+    ".json": (rb'{\s*"schema": "bushfit/', "a model or another result of bushfit"),
 }
 #: Pattern of an inline table of TOML in the hint of an error.
 _TABLE = re.compile(r"\{[^}]*\}")

@@ -63,9 +63,9 @@ def command(files: tuple[Path, ...], name: str | None, no_input: bool, output: O
     -o my_bushing.toml; for several parts, a campaign each and batch.toml. For several bushings of one compound, give
     the files of one bushing, and add the others under [[bushings]] (see configs/reference.toml).
     """
+    from bushfit.campaign.strain import implausible_strain
     from bushfit.geometry import Specimen
-    from bushfit.inspection.gathering import gather
-    from bushfit.inspection.plausible import implausible_strain
+    from bushfit.inspection.gathering import gather, with_contradictions
     from bushfit.inspection.record import campaign_text, campaigns_of_parts, with_specimens_named
 
     test_options: Mapping[str, Any] = sizes.pop("test_options")
@@ -82,7 +82,7 @@ def command(files: tuple[Path, ...], name: str | None, no_input: bool, output: O
     sources, left_out = gather(files, test_options)
     check_free(folder, [target], overwrite=output.force)
     inspections, histories = inspect_sources(sources, questions, is_sized=bushing is not None)
-    inspections, left_out = with_specimens_named(inspections), [*left_out, *histories]
+    inspections, left_out = with_contradictions(with_specimens_named(inspections)), [*left_out, *histories]
     if bushing is None and not all(isinstance(inspection.direction, Specimen) for inspection in inspections):
         bushing = questions.complete(sizes, size)
     table = bushing and bushing[1]
@@ -106,6 +106,10 @@ def command(files: tuple[Path, ...], name: str | None, no_input: bool, output: O
         output.print(f"{test}: {inspection.kind}, {inspection.direction}; {'; '.join(facts)}")
         strain = implausible_strain(inspection.measured, bushing[0]) if bushing and inspection.measured else ()
         output.warn(warning.about(inspection.label) for warning in (*inspection.odd, *strain))
+    if any(warning.kind == "test_repeat_differs" for inspection in inspections for warning in inspection.odd):
+        output.print(
+            "several bushings of one compound belong to [[bushings]], each with its sizes: bushfit manual campaign"
+        )
     for sentence, count in Counter(inspection.assumed for inspection in inspections).items():
         if sentence:
             output.print(f"{count} test{'s' * (count > 1)}: {sentence}")

@@ -148,7 +148,7 @@ def _reduce_resonance(
         The reduced test, and its campaign key ("direction" or "specimen") with the value of this key.
     """
     from bushfit.geometry import Direction
-    from bushfit.inspection.recognition import test_direction
+    from bushfit.reading.finding import direction_of_table
     from bushfit.reading.resonance import read_resonance
     from bushfit.reduction.resonance import reduce_resonance
 
@@ -160,7 +160,7 @@ def _reduce_resonance(
             expected="one file without --levels, because the amplitude follows the resonance",
             hint="call bushfit reduce for each file, with the mass of that test",
         )
-    direction, specimen = test_direction(table.file, table, test_options), shaker["specimen"] or None
+    direction, specimen = direction_of_table(table, test_options.get("direction")), shaker["specimen"] or None
     if direction is None and specimen is None:
         error = direction_error(table.file)
         error.hint = f'{error.hint}; or name the specimen that was tested: --specimen "mount"'

@@ -9,15 +9,16 @@ from typing import Any
 import numpy as np
 
 from bushfit.campaign.campaign import reader_keywords
+from bushfit.campaign.strain import implausible_strain
 from bushfit.caveat import Caveat
 from bushfit.errors import error_location
 from bushfit.geometry import Direction, Place, Specimen
 from bushfit.inspection.labels import contradicting_lines, count_temperatures, keys_from_labels, labels_of_file
 from bushfit.inspection.loops import describe_history, describe_loop, describe_programme
-from bushfit.inspection.plausible import implausible_strain
-from bushfit.inspection.recognition import recognize_table, test_direction, tested_body
+from bushfit.inspection.recognition import recognize_table, tested_body
 from bushfit.inspection.record import ColumnDescription, Findings, Inspection, Kind
 from bushfit.inspection.sweeps import describe_sweep
+from bushfit.reading.finding import direction_of_table
 from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS
 from bushfit.reading.layout import DELIMITERS
 from bushfit.reading.loops import read_loop
@@ -60,7 +61,7 @@ def inspect_file(
         MeasurementError, UnitError, CampaignError, FitError: a file or an option that cannot be used.
     """
     table, is_sweep = recognize_table(file, test_options)
-    place = tested_body(file, table, test_options) or of_book.direction
+    place = tested_body(table, test_options) or of_book.direction
     read_as = place or Direction.AXIAL  # which of two translations it is makes no difference to reading
     entry = campaign_entry(table, place, test_options, is_sweep=is_sweep)
     by_name = labels_of_file(file, table.source.sheet or "", test_options)
@@ -117,7 +118,7 @@ def read_history(file: Path, test_options: Mapping[str, Any]) -> tuple[Loop, Dir
             expected="a raw history: time, displacement, force",
             hint="list this file in the campaign under [[sweeps]]",
         )
-    direction = test_direction(file, table, test_options)
+    direction = direction_of_table(table, test_options.get("direction"))
     entry = campaign_entry(table, direction, test_options, is_sweep=False)
     return read_loop(**reader_arguments(table, direction or Direction.AXIAL, entry, LoopFile)), direction
 

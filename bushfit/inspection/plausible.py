@@ -7,10 +7,9 @@ import numpy as np
 
 from bushfit.caveat import Caveat
 from bushfit.effects.contract import Array
-from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Bushing, Place, unit_strain
-from bushfit.reading.measurement import Loop, Sweep
+from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Place
 from bushfit.reading.preload import Preload
-from bushfit.units import display_unit, format_range, number
+from bushfit.units import display_unit, number
 
 #: Smallest and largest frequency of a test [Hz]; chosen: from one cycle a month to ultrasound.
 FREQUENCIES = (4e-7, 1e5)
@@ -19,18 +18,6 @@ FREQUENCIES = (4e-7, 1e5)
 _AMPLITUDES = {TRANSLATION: (1e-8, 0.2), ROTATION: (1e-7, 4.0), STRAINING: (1e-8, 2.0)}
 _FORCES = {TRANSLATION: (0.0, 2e5), ROTATION: (0.0, 1e5), STRAINING: (0.0, 1e9)}
 _STIFFNESSES = {TRANSLATION: (1e4, 1e11), ROTATION: (1e-3, 1e9), STRAINING: (1e4, 1e10)}
-#: Largest shear strain of a test [-]; chosen: rubber tears at two to six, and a test has thousands of cycles.
-_MOST_STRAIN = 1.5
-
-
-def implausible_strain(test: Loop | Sweep, bushing: Bushing | None) -> Iterator[Caveat]:
-    """Warn of a displacement that no rubber of this size endures; `bushing` is None for a specimen."""
-    half_range = float(np.ptp(test.displacement)) / 2.0 if isinstance(test, Loop) else float(test.amplitude.max())
-    strain = 2.0 * half_range * unit_strain(bushing, test.direction)
-    if strain > _MOST_STRAIN and test.direction.motion is not STRAINING:  # of strains warns `implausible_sizes`
-        size = format_range(test.direction.motion.displacement_unit, half_range)
-        sentence = f"an amplitude of {size} is a shear strain of {number(100.0 * strain, 2)} %"
-        yield Caveat("implausible_size", f"{sentence}: are its unit and the size of the rubber right?")
 
 
 def implausible_sizes(

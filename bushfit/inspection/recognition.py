@@ -10,12 +10,11 @@ from typing import Any
 
 from bushfit.campaign.bodies import SpecimenSettings
 from bushfit.errors import BushfitError, NoTestError, ResonanceTestError, quote_path
-from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Direction, Motion, Place, Specimen
-from bushfit.reading.finding import find_table
+from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Motion, Place, Specimen
+from bushfit.reading.finding import direction_of_table, find_table
 from bushfit.reading.headers import ERRORS, HINTS, LOOP_COLUMNS, RESONANCE_COLUMNS, SWEEP_COLUMNS, Vocabulary
 from bushfit.reading.labelled import Rows
 from bushfit.reading.layout import FileFormat
-from bushfit.reading.names import direction_of_file, named_direction
 from bushfit.reading.parts import OpenedFile, open_file
 from bushfit.reading.resonance import is_resonance
 from bushfit.reading.roles import PAIRS, names_for_motion, si_unit
@@ -124,13 +123,12 @@ def missing_role(table: Table, *, is_sweep: bool) -> str | None:
     return next((role for role in nearest if role not in roles), None)
 
 
-def tested_body(file: Path, table: Table, test_options: Mapping[str, Any]) -> Place | None:
+def tested_body(table: Table, test_options: Mapping[str, Any]) -> Place | None:
     """Determine the direction of the bushing, or the specimen, that was tested.
 
     A modulus belongs to a specimen, a stiffness to the bushing unless the options give the sizes of a block in shear.
 
     Args:
-        file: test file.
         table: table of the file.
         test_options: what the user states on the test, by campaign key such as "direction".
 
@@ -146,45 +144,9 @@ def tested_body(file: Path, table: Table, test_options: Mapping[str, Any]) -> Pl
         headers = table.layout.written or [column.header for column in table.roles.values()]
         keys = {"kind": "modulus"} | ({"strain": "tension"} if any(map(_TENSILE.search, headers)) else {})
     elif len(keys) == 1:
-        return test_direction(file, table, test_options)
+        return direction_of_table(table, test_options.get("direction"))
     name = test_options.get("specimen", "bar" if "strain" in keys else "coupon")
     return Specimen(**vars(validate_tables({"name": name, **keys}, None, SpecimenSettings)))
-
-
-def test_direction(file: Path, table: Table, test_options: Mapping[str, Any]) -> Direction | None:
-    """Determine the direction of a test of the bushing from the option --direction, or else from the file.
-
-    Args:
-        file: test file.
-        table: table of the file.
-        test_options: what the user states on the test, by campaign key such as "direction".
-
-    Returns:
-        The direction; None if neither option nor file states it.
-
-    Raises:
-        MeasurementError: the file states another direction than the option, or several directions.
-    """
-    is_torsion = any(table.agrees(role, "rad") for role in ("displacement", "amplitude"))
-    headers = table.layout.written or table.headers
-    in_column = dict.fromkeys(table.row_labels.get("direction", (0, ()))[1])
-    by_name = direction_of_file(file, (), turns=is_torsion, sheet=table.source.sheet)
-    # test machines call the channels of their actuator axial, whatever the direction of the bushing
-    of_channels = named_direction(headers)
-    stated = Direction(*in_column) if len(in_column) == 1 else by_name or table.labels_above.direction
-    option, in_text = test_options.get("direction"), named_direction(line.text for line in table.lines_above)
-    is_doubtful = of_channels is Direction.AXIAL and (option or in_text not in (None, of_channels))
-    found = stated or (None if is_doubtful else of_channels)
-    texts, problem = list(in_column), ""
-    if option is None and len(in_column) > 1:
-        problem, hint = "this file contains tests in several directions", "state one: --direction axial"
-    elif option and found and found != option and len(in_column) < 2:
-        problem = f"{'the units say' if is_torsion else 'the file says'} {found}, but --direction says {option}"
-        texts = [file.name, table.source.sheet or "", *headers]
-        hint = "leave --direction out, or correct what the file states"
-    if problem:
-        raise table.header_error(problem, found=", ".join(filter(None, texts)), expected="one direction", hint=hint)
-    return Direction(option) if option else found
 
 
 def open_content(file: Path, test_options: Mapping[str, Any]) -> OpenedFile:

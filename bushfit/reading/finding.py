@@ -6,12 +6,13 @@ from dataclasses import replace
 from pathlib import Path
 
 from bushfit.errors import BushfitError, MeasurementError, error_location
-from bushfit.geometry import TRANSLATION, Motion
+from bushfit.geometry import TRANSLATION, Direction, Motion
 from bushfit.reading.blocks import combine_blocks
 from bushfit.reading.classification import classify
 from bushfit.reading.headers import ALL_COLUMNS, HINTS, Vocabulary
 from bushfit.reading.labelled import Rows, select_rows
 from bushfit.reading.layout import DELIMITERS, FileFormat, Layout, find_layout
+from bushfit.reading.names import direction_of_file, named_direction
 from bushfit.reading.parts import OpenedFile, open_file
 from bushfit.reading.reshape import reshape_table
 from bushfit.reading.roles import PAIRS, is_test, names_for_motion
@@ -115,3 +116,38 @@ def _locate(
                     source, layout = long, find_layout(long.head, vocabulary, "")
                 located.append(((source, layout), combine_blocks(source, layout, vocabulary)))
     return opened.located[key]
+
+
+def direction_of_table(table: Table, option: str | None = None) -> Direction | None:
+    """Determine the direction of a test of the bushing from the option --direction, or else from the file.
+
+    Args:
+        table: table of the test.
+        option: direction that the user states; None without one.
+
+    Returns:
+        The direction; None if neither option nor file states it.
+
+    Raises:
+        MeasurementError: the file states another direction than the option, or several directions.
+    """
+    is_torsion = any(table.agrees(role, "rad") for role in ("displacement", "amplitude"))
+    headers = table.layout.written or table.headers
+    in_column = dict.fromkeys(table.row_labels.get("direction", (0, ()))[1])
+    by_name = direction_of_file(table.file, (), turns=is_torsion, sheet=table.source.sheet)
+    # test machines call the channels of their actuator axial, whatever the direction of the bushing
+    of_channels = named_direction(headers)
+    stated = Direction(*in_column) if len(in_column) == 1 else by_name or table.labels_above.direction
+    in_text = named_direction(line.text for line in table.lines_above)
+    is_doubtful = of_channels is Direction.AXIAL and (option or in_text not in (None, of_channels))
+    found = stated or (None if is_doubtful else of_channels)
+    texts, problem = list(in_column), ""
+    if option is None and len(in_column) > 1:
+        problem, hint = "this file contains tests in several directions", "state one: --direction axial"
+    elif option and found and found != option and len(in_column) < 2:
+        problem = f"{'the units say' if is_torsion else 'the file says'} {found}, but --direction says {option}"
+        texts = [table.file.name, table.source.sheet or "", *headers]
+        hint = "leave --direction out, or correct what the file states"
+    if problem:
+        raise table.header_error(problem, found=", ".join(filter(None, texts)), expected="one direction", hint=hint)
+    return Direction(option) if option else found

@@ -19,7 +19,7 @@ from pydantic import BeforeValidator
 from bushfit.caveat import Caveat
 from bushfit.reading.channel_lists import listed_names, scales_above
 from bushfit.reading.headers import WORDS, Vocabulary, plain, plain_name, split_unit
-from bushfit.reading.lines import MOST_COLUMNS, Content, Line, is_comment, is_row, is_units_row, split
+from bushfit.reading.lines import MOST_COLUMNS, Content, Line, cells_below, is_comment, is_row, is_units_row, split
 from bushfit.reading.numerals import is_like_number, plainest_value
 from bushfit.reading.roles import UNIT_NAMES, X_UNIT_NAMES, is_test, is_unit_alone, stated_once
 from bushfit.reading.times import parse_clock
@@ -47,9 +47,8 @@ _DESCRIPTIONS = UNIT_NAMES | frozenset(map(plain, WORDS["rows_of"]["descriptions
 _LETTER, _NUMBERED = re.compile(r"[^\W\d_]"), re.compile(r"#\s?\d+\b")
 #: Names of the types of columns, in rows that programs write above or below the names; and what separates them.
 _TYPES, _SEPARATORS = frozenset(map(plain, ("", *WORDS["rows_of"]["types"]))), re.compile(r"[\s;,|]+")
-#: Blanks between a name and the bracket of its unit, which do not separate columns; and cell of a line whose columns
-#: are separated by wide gaps.
-_BLANK_BEFORE_BRACKET, _CELL = re.compile(r" {1,8}(?=[\[(])"), re.compile(r"\S+(?: \S+)*")
+#: Blanks between a name and the bracket of its unit, which do not separate columns.
+_BLANK_BEFORE_BRACKET = re.compile(r" {1,8}(?=[\[(])")
 #: Wide gap, which is shortened to two blanks; and gap between columns whose headers contain single blanks.
 _WIDE_GAP, _COLUMN_GAP = re.compile(" {3,}"), re.compile(r"\t|\s{2,}")
 
@@ -366,7 +365,7 @@ def _with_units(layout: Layout, lines: Sequence[Line], index: int, vocabulary: V
     for line in (*descriptions[:1], *below[len(descriptions) :][:1]):
         cells = [cell.strip("[]() ") for cell in split(line.content, layout.delimiter)]
         if layout.delimiter == " " and isinstance(line.content, str):
-            wide = [cell.strip("[]() ") for cell in _below_headers(str(lines[index].content), line.content)]
+            wide = [cell.strip("[]() ") for cell in cells_below(str(lines[index].content), line.content)]
             cells = wide if len(wide) == len(headers) else cells
         are_named = [vocabulary.heading(cell) is not None for cell in cells]
         if _are_units_of(headers, cells):
@@ -404,14 +403,3 @@ def _with_unnamed_columns(layout: Layout, below: Sequence[Sequence[str]]) -> Lay
     if are_numbered or not all(map(is_like_number, counts)):
         return replace(layout, headers=(*unnamed, *headers), units=(*unnamed, *row))
     return replace(layout, headers=(*headers, *unnamed), units=(*row, *unnamed))
-
-
-def _below_headers(header: str, row: str) -> list[str]:
-    """Unit below each header, "" without one, in two lines whose columns are aligned by blanks: headers and units."""
-    spans, cells = ([(*cell.span(), cell[0]) for cell in _CELL.finditer(line.expandtabs())] for line in (header, row))
-    by_column = {
-        max(range(len(spans)), key=lambda n: min(end, spans[n][1]) - max(start, spans[n][0])): text
-        for start, end, text in cells
-    }
-    aligned = [by_column.get(n, "") for n in range(len(spans))]
-    return aligned if len(by_column) == len(cells) < len(spans) else [text for *_, text in cells]

@@ -24,6 +24,8 @@ WITH_UNIT = re.compile(
     rf"(?:±|\+/?-)?\s*(?P<number>[+-]?[\d.,]++(?:\s*+{EXPONENT})?+)\s*+(?P<unit>(?:[^\W\d]|[°%‰])[^;]{{0,20}})"
 )
 
+#: Cell of a line whose columns are separated by wide gaps.
+_CELL = re.compile(r"\S+(?: \S+)*")
 #: End of a row in a matrix of MATLAB.
 _END_OF_MATRIX_ROW = re.compile(r"\s*;\s*(?:\.{3})?$")
 
@@ -86,3 +88,14 @@ def is_summary_row(cells: Sequence[str]) -> bool:
     """Return True if the first text of a row is a word such as "Mean" or "Std", so that it summarises other rows."""
     first = next(filter(None, cells), "")
     return _DIGIT.search(first) is None and plain(first) in _SUMMARIES
+
+
+def cells_below(header: str, row: str) -> list[str]:
+    """Return the unit below each header, "" without one, in two lines with columns aligned by blanks: headers, units."""
+    spans, cells = ([(*cell.span(), cell[0]) for cell in _CELL.finditer(line.expandtabs())] for line in (header, row))
+    by_column = {
+        max(range(len(spans)), key=lambda n: min(end, spans[n][1]) - max(start, spans[n][0])): text
+        for start, end, text in cells
+    }
+    aligned = [by_column.get(n, "") for n in range(len(spans))]
+    return aligned if len(by_column) == len(cells) < len(spans) else [text for *_, text in cells]

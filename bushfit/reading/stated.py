@@ -160,7 +160,7 @@ class TestFile(FileFormat):
 
     Args:
         file: path of the test file, relative to the campaign file.
-        direction: direction of the bushing; None for a specimen.
+        direction: direction of the bushing; None for a specimen, or if the file states it.
         specimen: name of the specimen in [[specimens]]; default the bushing.
         bushing: name in [[bushings]] of the bushing, if the campaign has several.
         noise: relative standard deviation of a point; None if it is not known.

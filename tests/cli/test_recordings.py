@@ -55,8 +55,6 @@ SPOILED: dict[str, tuple[str, ...]] = {
     "scalars.mat": ("holds no channels", "table2struct"),
     "modes.unv": ("dataset 58",),
     "bomb.mat": ("cannot be read", "the file unpacks to 1099511627776 values"),
-    "text.mat": ("this is not a MATLAB file", "a MATLAB file, according to"),
-    "text.uff": ("this is not a UFF file",),
     "empty.mf4": ("the file is empty",),
     **{
         f"cut: {name}": ("file cannot be read", "incomplete")
@@ -71,7 +69,7 @@ SPOILED: dict[str, tuple[str, ...]] = {
 @pytest.mark.parametrize("case", SPOILED)
 def test_what_cannot_be_read_is_one_clear_error(typed, tmp_path, case):
     name = case.removeprefix("cut: ")
-    content = (FILES / name).read_bytes() if (FILES / name).exists() else LOOP.to_csv().encode() * ("text" in name)
+    content = (FILES / name).read_bytes() if (FILES / name).exists() else b""
     (tmp_path / name).write_bytes(content[: len(content) * 3 // 5] if case.startswith("cut") else content)
     (tmp_path / "c.toml").write_text(f'{BUSHING}\n[[loops]]\nfile = "{name}"\ndirection = "axial"\n')
     for line in (("run", "c.toml"), ("inspect", name), ("init", name, "--direction", "axial", *GEOMETRY)):

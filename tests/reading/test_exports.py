@@ -103,10 +103,10 @@ def test_an_export_is_read_right_or_raises_a_question(initial, tmp_path, file_re
 
 
 def test_rows_without_a_remark_are_selected_as_inspect_prints(tmp_path):
-    (tmp_path / "export.csv").write_bytes((FILES / "a_remark_on_bad_rows.txt").read_bytes())
-    (sweep,) = inspected(tmp_path, "export.csv")[1]
-    campaign = tmp_path / "campaign.toml"
-    campaign.write_text(campaign.read_text() + 'rows = { "Remark" = "" }\n')
+    (tmp_path / "axial.csv").write_bytes((FILES / "a_remark_on_bad_rows.txt").read_bytes())
+    (sweep,) = inspected(tmp_path, "axial.csv")[1]
+    campaign = tmp_path / "campaign.toml"  # the name of the file states the direction
+    campaign.write_text(campaign.read_text().replace('direction = "axial"\n', "") + 'rows = { "Remark" = "" }\n')
     assert (sweep.frequency.size, load_campaign(campaign).sweeps[0].frequency.size) == (12, 10)
     check(load_campaign(campaign).sweeps[0], expected("sweep"))
 
