@@ -104,10 +104,9 @@ Stiffness = Annotated[float, _STIFFNESS, _LIMIT]
 
 @dataclass(frozen=True, kw_only=True)
 class PointLimits:
-    """Operating point to which limits apply.
+    """Base class of tables of limits that apply at one operating point.
 
-    If this is the last base class of a table, pydantic reads the point before the limits, whose unit depends on the
-    point.
+    List it as the last base class: pydantic then reads the point before the limits, whose unit depends on the point.
 
     Args:
         at: operating point, such as "axial 25 Hz 0.1 mm".

@@ -125,7 +125,7 @@ class PredictionOutput:
 
     @cached_property
     def tests(self) -> tuple[Misfit, ...]:
-        """Misfit between model and each measured sweep and run: NRMSE, reduced chi-square, mean difference of |K|."""
+        """Misfit of the model in each measured sweep, and in each of its runs at constant amplitude or frequency."""
         return misfits(self.result.model, *self.measured_by_fit)
 
     @cached_property

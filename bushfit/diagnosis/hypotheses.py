@@ -250,7 +250,8 @@ class SearchState:
     def parameters(self) -> tuple[dict[str, float], Covariance]:
         """Posterior means [SI] and covariance of the parameters that are not at a bound.
 
-        The covariance includes errors of the rig, and a smooth deviation and a fast relaxation of the rubber.
+        The covariance allows for errors of the rig, for a smooth deviation of the rubber from its model, and for a
+        relaxation of the rubber above the tested frequencies.
         """
         bare, values, rig = self.bare, self.bare.model.values, self.columns.errors
         rig = replace(rig, cases=[rig.cases[n] for n in self._likely_cases])

@@ -298,7 +298,10 @@ class MeasuredSweep(MeasuredBase):
         return self.level_errors.whiten(self.run_errors.whiten(rows))
 
     def noise_sensitivity(self, influence: Array) -> dict[Hashable, Array]:
-        """Change of the weights of the residuals in k estimates by one standard error of each noise variance.
+        """Change of the weights of the residuals in k estimates if a noise variance changes by its standard error.
+
+        Args:
+            influence: weights of the whitened residuals (gain and phase of n points) in the estimates, (k, 2 n).
 
         Returns:
             Changes of `influence`, (k, 2 n), by identifier of the noise variance; see `MeasuredLoop`.

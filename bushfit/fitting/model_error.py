@@ -253,7 +253,7 @@ def log_likelihood(solution: FitResult, prior_precision: Mapping[str, float]) ->
 
     Args:
         solution: result of the fit.
-        prior_precision: precision (inverse variance) of the prior of each parameter's coordinate, by parameter name; 0
+        prior_precision: precision (inverse variance) of the prior of each parameter, in its dimensionless coordinate; 0
             for the other parameters.
 
     Returns:

@@ -216,11 +216,14 @@ def measured_levels(sweeps: Sequence[Sweep], axis: Literal["frequency", "amplitu
 
 
 def _distinct(values: Array, digits: int = 17) -> Array:
-    """Sort values, (n,), and merge those within 1 % of each other: the rig reaches a set point only approximately.
+    """Sort values, and omit those up to 1 % above the one before: the rig reaches a set point only approximately.
 
     Args:
         values: frequencies or amplitudes, (n,), in any order.
-        digits: significant digits to which the values are rounded; by default they are unchanged.
+        digits: significant digits to which the values are rounded first; by default they are unchanged.
+
+    Returns:
+        The remaining values, ascending, (k,).
     """
     distinct: list[float] = []
     for value in np.unique([float(f"{value:.{digits}g}") for value in values]).tolist():
