@@ -19,7 +19,6 @@ from bushfit.units import number
 
 if TYPE_CHECKING:
     from bushfit.commands.diagnose import DiagnosisOutput
-    from bushfit.diagnosis.document import EffectEntry
 
 #: Title of the regions in which model and tests disagree.
 _WHERE = "where (size of the smooth part of the gap, in standard errors σ)"
@@ -127,10 +126,25 @@ def print_verdict(output: Output, diagnosed: DiagnosisOutput, again: str, action
 
 
 def print_findings(output: Output, diagnosed: DiagnosisOutput) -> None:
-    """Print the named effects with their sizes, the gap (rms residual / noise), its location, and the next test."""
+    """Print the named effects with their sizes, the gap (rms residual / noise), its location, and the next test.
+
+    The size of an effect that the fitted model includes is among the parameters of the model.
+    """
+    from bushfit.effects.unnamed import effect_label
+    from bushfit.report.parameters import effect_sizes
+
     console, diagnosis, document = output.console, diagnosed.diagnosis, diagnosed.document
     for effect in document["effects"]:
-        _print_effect(output, effect, in_model=effect["name"] in diagnosis.result.model.effects)
+        test = f" in {effect['test']}" if effect["test"] else ""
+        level = "bushing or rig" if effect["level"] == "unresolved" else effect["level"]
+        title = f"[bold]{effect_label(effect['name'])}[/bold]{escape(test)}"
+        console.print(f"  {title} ({level}): {escape(effect['sentence'])}")
+        in_model = effect["name"] in diagnosis.result.model.effects
+        for parameter, value, interval in () if in_model else effect_sizes(effect):
+            error = f"95 % {interval}" if interval else "error not known: do not quote this value"
+            console.print(f"    {parameter} = {value}, {error}")
+        if effect["correction"]:
+            console.print(f"    correction in the campaign: {escape(effect['correction'])}")
     _print_gap(output, document)
     for title, regions in ((_WHERE, diagnosis.where), ("what remains", diagnosis.remainder)):
         if regions and not (title == "what remains" and diagnosis.remainder == diagnosis.where):
@@ -158,20 +172,3 @@ def _print_gap(output: Output, document: Mapping[str, Any]) -> None:
     if output.verbose:
         for part in gap["skipped"]:
             output.console.print(f"  not held out: {part['part']}; {part['reason']}")
-
-
-def _print_effect(output: Output, effect: EffectEntry, *, in_model: bool) -> None:
-    """Print one named effect: description, parameters unless the model has them, and the correction of a record."""
-    from bushfit.effects.unnamed import effect_label
-    from bushfit.report.parameters import effect_sizes
-
-    console = output.console
-    test = f" in {effect['test']}" if effect["test"] else ""
-    level = "bushing or rig" if effect["level"] == "unresolved" else effect["level"]
-    title = f"[bold]{effect_label(effect['name'])}[/bold]{escape(test)}"
-    console.print(f"  {title} ({level}): {escape(effect['sentence'])}")
-    for parameter, value, interval in () if in_model else effect_sizes(effect):
-        error = f"95 % {interval}" if interval else "error not known: do not quote this value"
-        console.print(f"    {parameter} = {value}, {error}")
-    if effect["correction"]:
-        console.print(f"    correction in the campaign: {escape(effect['correction'])}")

@@ -133,7 +133,14 @@ def _print_plan(output: Output, plan: Plan) -> None:
             output.print("diagnose first, and plan from its model.json: no test reduces the error of the present model")
         output.print(f"{runs} reduce the standard error of the stiffness: {', '.join(gains)}")
     output.print(f"starting point: {document['source']}")
-    _print_tests(output, plan)
+    tests, lines = plan.tests, []
+    for test, count in Counter(tests).items():
+        run, (unit, factor) = document["tests"][tests.index(test)], test.direction.display.displacement
+        kind = f"sweep over {run['stepped']}" if run["kind"] == "sweep" else f"loop, {run['cycles']} cycles"
+        motion = f"{_listed(run['amplitudes'], factor)} {unit}", _listed(run["frequencies_Hz"], 1.0)
+        lines.append((run["place"], kind, *motion, str(count)))
+    columns: tuple[str, ...] = ("direction", "test", "amplitude", "frequency [Hz]", "runs")
+    output.print_table(f"{len(tests)} runs", columns, lines, text_columns=4)
     error_columns = "quantity", "before", f"plan, {hours} h", f"standard, {number(document['hours_standard'], 3)} h"
     rows = dict(document["parameters"])
     rows |= {f"stiffness, {place}": row for place, row in document["stiffness"].items()}
@@ -154,18 +161,6 @@ def _print_plan(output: Output, plan: Plan) -> None:
     if document["enough"]:
         output.print(document["enough"])
     output.warn(to_caveats(document["warnings"], document["warning_kinds"]))
-
-
-def _print_tests(output: Output, plan: Plan) -> None:
-    """Print a table of the planned tests with the number of runs of each."""
-    tests, rows = plan.tests, []
-    for test, count in Counter(tests).items():
-        run, (unit, factor) = plan.document["tests"][tests.index(test)], test.direction.display.displacement
-        kind = f"sweep over {run['stepped']}" if run["kind"] == "sweep" else f"loop, {run['cycles']} cycles"
-        motion = f"{_listed(run['amplitudes'], factor)} {unit}", _listed(run["frequencies_Hz"], 1.0)
-        rows.append((run["place"], kind, *motion, str(count)))
-    columns = ("direction", "test", "amplitude", "frequency [Hz]", "runs")
-    output.print_table(f"{len(tests)} runs", columns, rows, text_columns=4)
 
 
 def _listed(values: Sequence[float], factor: float) -> str:

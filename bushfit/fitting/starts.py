@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from bushfit.effects import get_parameter
+from bushfit.effects.contract import Array
 from bushfit.effects.friction import harmonic_shape
 from bushfit.errors import FitError
 from bushfit.fitting.assess import implausible_modulus
@@ -76,9 +77,9 @@ def start_values(
     if not slow.all() and np.ptp(log_omega) >= _LEAST_RANGE:
         least_loss = _LEAST_SHARE * modulus.imag.clip(min=0.0) + 1e-9 * mu  # above zero, for its logarithm
         viscous_loss = np.maximum(modulus.imag - friction.imag, least_loss)
-        alpha = float(np.clip(np.polyfit(log_omega, np.log(viscous_loss[smallest]), 1)[0], *_ALPHA_RANGE))
+        alpha = float(np.clip(_slope(log_omega, np.log(viscous_loss[smallest])), *_ALPHA_RANGE))
         middle = float(np.exp(log_omega.mean()))
-        growth = max(float(np.polyfit(log_omega, modulus.real[smallest], 1)[0]), _LEAST * mu)
+        growth = max(_slope(log_omega, modulus.real[smallest]), _LEAST * mu)
         m = 2.0 * growth / (alpha * middle**alpha * np.cos(np.pi * alpha / 2.0))
     found = {"mu": mu, "m": m, "alpha": alpha, "sigma_fmax": sigma_fmax, "eps_half": eps_half}
     found = {name: value for name, value in found.items() if name not in fixed}
@@ -90,3 +91,9 @@ def start_values(
             hint="if units and dimensions are right, give start values in [fit] of the campaign",
         )
     return {**inside, **fixed}
+
+
+def _slope(x: Array, y: Array) -> float:
+    """Slope of the straight line fitted to points x and y, (n,) each."""
+    centred = x - x.mean()
+    return float(centred @ y / (centred @ centred))
