@@ -245,7 +245,7 @@ class MeasuredLoop(MeasuredBase):
         return np.where(self.weights > 0.0, self.misfit(model), self._difference(model) / self.noise)
 
     def _difference(self, model: Model) -> Array:
-        """Model minus measured force [N or N m] at each row, (n,), minus its mean: the zero of a load cell is unknown."""
+        """Model minus measured force [N or N m], (n,), minus its mean, because the zero of a load cell is unknown."""
         difference = self.response(model) - self.measured_force
         return difference - np.mean(difference[self.weights > 0.0])
 

@@ -91,7 +91,7 @@ def is_summary_row(cells: Sequence[str]) -> bool:
 
 
 def cells_below(header: str, row: str) -> list[str]:
-    """Return the unit below each header, "" without one, in two lines with columns aligned by blanks: headers, units."""
+    """Return the unit below each header ("" without one) in two lines, whose columns are aligned by blanks."""
     spans, cells = ([(*cell.span(), cell[0]) for cell in _CELL.finditer(line.expandtabs())] for line in (header, row))
     by_column = {
         max(range(len(spans)), key=lambda n: min(end, spans[n][1]) - max(start, spans[n][0])): text
