@@ -226,7 +226,7 @@ def split_rows(source: TestSource, left_out: list[Caveat]) -> list[TestSource]:
         is_stated = all(same_text(str(test_options.get(key, text)), text) for key, text in keys.items())
         if is_direction and is_stated and tests_at_levels:
             tests += [replace(source, test_options={**test_options, **keys, **run, **test}) for test in tests_at_levels]
-        else:
+        elif texts:
             why = "other values were stated" if is_direction else "the direction is unknown"
             left_out.append(Caveat("left_out", f"rows of {', '.join(texts)} are not used: {why}").about(source))
     return tests or [source]
