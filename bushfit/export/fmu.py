@@ -111,21 +111,13 @@ def compile_library(sources: Mapping[str, bytes], name: str) -> tuple[str, bytes
     target = f"{_PROCESSORS.get(machine, machine)}-{target}"
     # the compiler looks for its caches below the home folder, which a service or a container may lack
     cache = Path(tempfile.gettempdir()) / f"bushfit-compiler-{os.getuid() if hasattr(os, 'getuid') else 'cache'}"
-    caches = {"ZIG_GLOBAL_CACHE_DIR": str(cache), "ZIG_LOCAL_CACHE_DIR": str(cache)}
+    environment = {**os.environ, "ZIG_GLOBAL_CACHE_DIR": str(cache), "ZIG_LOCAL_CACHE_DIR": str(cache)}
     with tempfile.TemporaryDirectory() as folder:
         for file, content in sources.items():
             (Path(folder) / file).write_bytes(content)
         units = [file for file in sources if file.endswith(".c")]
         command = [sys.executable, "-m", "ziglang", "cc", "-target", target, *_OPTIONS, *units, "-o", f"{name}{suffix}"]
-        done = subprocess.run(
-            command,
-            cwd=folder,
-            env={**os.environ, **caches},
-            capture_output=True,
-            text=True,
-            timeout=300.0,
-            check=False,
-        )
+        done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, timeout=300.0)
         if done.returncode:
             message = (done.stderr or done.stdout).strip()
             raise OutputError("the compiler of the FMU failed", place=target, found=message)

@@ -35,20 +35,18 @@ def reduced_table(reduction: Reduction) -> pd.DataFrame:
     (length, length_factor), _, (stiffness, _) = place.display
     responses = response_columns(place, steps["stiffness"].to_numpy())
     magnitude, factors = responses.values()
-    frame = pd.DataFrame(
-        {
-            "frequency [Hz]": [float(f"{frequency:.5g}") for frequency in steps["nominal_frequency"]],
-            f"amplitude [{length}]": [float(f"{length_factor * level:.5g}") for level in steps["level"]],
-            f"amplitude reached [{length}]": steps["amplitude"] * length_factor,
-            "repeat": steps["repeat"],
-            **responses,
-            f"stiffness std error [{stiffness}]": steps["gain_error"] * magnitude,
-            "loss factor std error [-]": steps["phase_error"] * (1.0 + factors**2),
-            **{header: steps[key] for header, key in _OF_STEPS.items()},
-        }
-    )
+    columns = {
+        "frequency [Hz]": [float(f"{frequency:.5g}") for frequency in steps["nominal_frequency"]],
+        f"amplitude [{length}]": [float(f"{length_factor * level:.5g}") for level in steps["level"]],
+        f"amplitude reached [{length}]": steps["amplitude"] * length_factor,
+        "repeat": steps["repeat"],
+        **responses,
+        f"stiffness std error [{stiffness}]": steps["gain_error"] * magnitude,
+        "loss factor std error [-]": steps["phase_error"] * (1.0 + factors**2),
+        **{header: steps[key] for header, key in _OF_STEPS.items()},
+    }
     order = [f"amplitude [{length}]", "repeat", "frequency [Hz]"]
-    return frame.sort_values(order, ignore_index=True, kind="stable")
+    return pd.DataFrame(columns).sort_values(order, ignore_index=True, kind="stable")
 
 
 def resonance_table(resonance: Resonance) -> pd.DataFrame:
@@ -61,13 +59,12 @@ def resonance_table(resonance: Resonance) -> pd.DataFrame:
         A row per frequency: the columns of a sweep file, then relative error, transmissibility and averaged rows.
     """
     place = Direction.AXIAL  # or radial: the units are the same
-    return pd.DataFrame(
-        {
-            "frequency [Hz]": resonance.frequency,
-            response_headers(place)[0]: resonance.amplitude * place.display.displacement.factor,
-            **response_columns(place, resonance.stiffness),
-            "relative error [-]": resonance.relative_error,
-            "transmissibility [-]": np.abs(resonance.transmissibility),
-            "rows averaged": resonance.rows,
-        }
-    )
+    columns = {
+        "frequency [Hz]": resonance.frequency,
+        response_headers(place)[0]: resonance.amplitude * place.display.displacement.factor,
+        **response_columns(place, resonance.stiffness),
+        "relative error [-]": resonance.relative_error,
+        "transmissibility [-]": np.abs(resonance.transmissibility),
+        "rows averaged": resonance.rows,
+    }
+    return pd.DataFrame(columns)

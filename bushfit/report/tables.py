@@ -146,16 +146,15 @@ def predicted_resonance_table(resonance: PredictedResonance) -> pd.DataFrame:
         not show whether an effect belongs to the bushing or the rig, the same again as if it belongs to the rig.
     """
     place = resonance.direction
-    table = pd.DataFrame(
-        {
-            "frequency [Hz]": resonance.frequency,
-            "transmissibility [-]": np.abs(resonance.transmissibility),
-            "phase [deg]": np.degrees(np.angle(resonance.transmissibility)),
-            response_headers(place)[0]: resonance.amplitude * place.display.displacement.factor,
-            **response_columns(place, resonance.stiffness),
-            **condition_columns(resonance.conditions, place),
-        }
-    )
+    columns: dict[str, Any] = {
+        "frequency [Hz]": resonance.frequency,
+        "transmissibility [-]": np.abs(resonance.transmissibility),
+        "phase [deg]": np.degrees(np.angle(resonance.transmissibility)),
+        response_headers(place)[0]: resonance.amplitude * place.display.displacement.factor,
+        **response_columns(place, resonance.stiffness),
+        **condition_columns(resonance.conditions, place),
+    }
+    table = pd.DataFrame(columns)
     if resonance.if_in_rig:
         if_in_rig = predicted_resonance_table(resonance.if_in_rig).iloc[:, 1:].add_suffix(f", {IF_RIGS}")
         table = pd.concat([table, if_in_rig], axis=1)
@@ -226,21 +225,18 @@ def loops_table(model: Model, data_sets: Sequence[MeasuredLoop]) -> pd.DataFrame
         force = response_headers(place)[2]
         binned = data_set.phase.size < data_set.test.force.size
         outliers = np.empty(0) if binned else data_set.faulty_rows["force"].rows
-        tables.append(
-            pd.DataFrame(
-                {
-                    "loop": data_set.name,
-                    "direction": str(place),
-                    "time [s]": data_set.phase / data_set.frequency,
-                    "frequency [Hz]": data_set.frequency[0],
-                    displacement_header(place): series(data_set.coefficients, data_set.phase) * length,
-                    force: data_set.measured_force * factor,
-                    f"model {force}": data_set.response(model) * factor,
-                    "residual [noise]": -data_set.displayed_residual(model),
-                    "outlier": np.where(np.isin(np.arange(data_set.phase.size), outliers), "yes", "no"),
-                }
-            )
-        )
+        columns: dict[str, Any] = {
+            "loop": data_set.name,
+            "direction": str(place),
+            "time [s]": data_set.phase / data_set.frequency,
+            "frequency [Hz]": data_set.frequency[0],
+            displacement_header(place): series(data_set.coefficients, data_set.phase) * length,
+            force: data_set.measured_force * factor,
+            f"model {force}": data_set.response(model) * factor,
+            "residual [noise]": -data_set.displayed_residual(model),
+            "outlier": np.where(np.isin(np.arange(data_set.phase.size), outliers), "yes", "no"),
+        }
+        tables.append(pd.DataFrame(columns))
     return pd.concat(tables, ignore_index=True)
 
 
@@ -263,25 +259,22 @@ def sweeps_table(model: Model, data_sets: Sequence[MeasuredSweep]) -> pd.DataFra
     for data_set in data_sets:
         place, modelled = data_set.direction, data_set.response(model)
         gain, phase = np.split(-data_set.displayed_residual(model), 2)
-        tables.append(
-            pd.DataFrame(
-                {
-                    "sweep": data_set.name,
-                    "direction": str(place),
-                    **sweep_condition_columns(data_set),
-                    "frequency [Hz]": data_set.frequency,
-                    response_headers(place)[0]: data_set.amplitude * place.display.displacement.factor,
-                    "repeat": data_set.repeat,
-                    **response_columns(place, data_set.measured),
-                    **response_columns(place, modelled, "model "),
-                    "stiffness residual [noise]": gain,
-                    "loss residual [noise]": phase,
-                    "measured over model [-]": np.abs(data_set.measured / modelled),
-                    "loss factor difference [-]": loss_factor(data_set.measured) - loss_factor(modelled),
-                    "outlier": np.where(data_set.weights > 0.0, "no", "yes"),
-                }
-            )
-        )
+        columns: dict[str, Any] = {
+            "sweep": data_set.name,
+            "direction": str(place),
+            **sweep_condition_columns(data_set),
+            "frequency [Hz]": data_set.frequency,
+            response_headers(place)[0]: data_set.amplitude * place.display.displacement.factor,
+            "repeat": data_set.repeat,
+            **response_columns(place, data_set.measured),
+            **response_columns(place, modelled, "model "),
+            "stiffness residual [noise]": gain,
+            "loss residual [noise]": phase,
+            "measured over model [-]": np.abs(data_set.measured / modelled),
+            "loss factor difference [-]": loss_factor(data_set.measured) - loss_factor(modelled),
+            "outlier": np.where(data_set.weights > 0.0, "no", "yes"),
+        }
+        tables.append(pd.DataFrame(columns))
     return pd.concat(tables, ignore_index=True)
 
 
