@@ -12,7 +12,7 @@ from dataclasses import dataclass, fields, replace
 from functools import lru_cache, partial
 from itertools import chain
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, ConfigDict, Field
 
@@ -372,8 +372,6 @@ def complete_settings(row_settings: RowSettings, defaults: RowSettings, base: Pa
     if "respond" in commands and not settings.history:
         expected = 'history = "road.csv"'
         raise CampaignError("respond has no displacement history", file=source, place="history", expected=expected)
-    model, history = (
-        os.path.abspath(base / path) if path else None  # noqa: PTH100
-        for path in (settings.model, settings.history)
-    )
-    return replace(settings, commands=commands, model=model, history=history)
+    files = {"model": settings.model, "history": settings.history}
+    paths: dict[str, Any] = {name: os.path.abspath(base / path) for name, path in files.items() if path}  # noqa: PTH100
+    return replace(settings, commands=commands, **paths)

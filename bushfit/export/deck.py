@@ -215,11 +215,9 @@ def table_omissions(request: ExportRequest, form: StiffnessForm) -> Iterator[Cav
             ratios = np.concatenate([np.abs(reference.stiffness / table.stiffness) for table in tables])
             unit, factor = place.display.displacement
             low, value, high = (number(table.amplitude * factor, 4) for table in (tables[0], reference, tables[-1]))
-            yield Caveat(
-                "format_error",
-                f"each property has one amplitude. The property of {value} {unit} has errors of "
-                f"{format_deviation(ratios)} in |K| at {low} to {high} {unit}",
-            ).about(place)
+            errors = f"errors of {format_deviation(ratios)} in |K| at {low} to {high} {unit}"
+            sentence = f"each property has one amplitude. The property of {value} {unit} has {errors}"
+            yield Caveat("format_error", sentence).about(place)
         if tables[0].frequency.size > 1:
             worst = 0.0
             for table in tables:  # linear interpolation halfway between two frequencies

@@ -212,11 +212,8 @@ def plan_warnings(search: PlanSearch) -> Iterator[Caveat]:
         )
     yield from knowledge.result.warnings
     if knowledge.bounded:
-        yield Caveat(
-            "plan_at_bound",
-            f"{join_names(knowledge.bounded)} ended at a bound: the planned errors of the other parameters "
-            "include half of the additional error of a fit without the bound",
-        )
+        sentence = f"{join_names(knowledge.bounded)} ended at a bound: the planned errors of the other parameters"
+        yield Caveat("plan_at_bound", f"{sentence} include half of the additional error of a fit without the bound")
     if search.goals and not search.determines_noise(counts):
         sentence = "repeats are too few to determine the scatter of sweeps"
         yield Caveat("few_repeats", f"{sentence}: intervals may be 1.5 times as wide as planned")
@@ -228,8 +225,6 @@ def plan_warnings(search: PlanSearch) -> Iterator[Caveat]:
         sentence = f"no test of this rig would distinguish {' from '.join(names)}: these rivals are left out"
         yield Caveat("rivals_alike", sentence)
     if knowledge.rivals and (chi_square := search.nearest_rivals(counts)) < RIVALS_APART:
-        yield Caveat(
-            "rivals_close",
-            f"the expected chi-square between the nearest rivals is {number(chi_square, 2)}, less "
-            f"than the {number(RIVALS_APART, 3)} that distinguishes them in nine of ten cases",
-        )
+        sentence = f"the expected chi-square between the nearest rivals is {number(chi_square, 2)}"
+        needed = f"less than the {number(RIVALS_APART, 3)} that distinguishes them in nine of ten cases"
+        yield Caveat("rivals_close", f"{sentence}, {needed}")

@@ -158,6 +158,7 @@ class PlannedQuantity:
         contributions = np.abs(self.rows[worst]) * np.sqrt(np.diag(limit))
         name = (*knowledge.names, *knowledge.bounded)[int(np.argmax(contributions))]
         gain, phase = knowledge.noise.level
+        undecided = "explanations that the tests cannot distinguish: bushfit diagnose states the next test"
         remaining = (
             f"the class of the rig, {number(100.0 * gain, 2)} % of gain and {number(1e3 * phase, 2)} mrad of phase "
             f"that all repeats of a test share, in {name}"
@@ -166,10 +167,7 @@ class PlannedQuantity:
             remaining = f"{name}, which no available test determines well enough"
         size, cause = max(
             (Z95 * float(self.model_error[worst]), "the model error: no test reduces it; diagnose may name its cause"),
-            (
-                float(self.undecided[worst]),
-                "explanations that the tests cannot distinguish: bushfit diagnose states the next test",
-            ),
+            (float(self.undecided[worst]), undecided),
             (Z95 * float(np.sqrt(variance[worst])), remaining),
         )
         location = ""

@@ -151,11 +151,8 @@ def _compressibility_warning(result: Result, bushing: Bushing, direction: Place)
     place = direction if direction.axis is Direction.RADIAL else Direction.RADIAL
     decrease = bushing.correction.stiffness_decrease(result.model.values.get("mu", 0.0)) if bushing.correction else 0.0
     if decrease > _NOTED_LOWERING:
-        percent = number(100.0 * decrease, 2)
-        sentence = (
-            "the model assumes incompressible rubber; a bulk modulus of 2 GPa would lower "
-            f"the radial stiffness of this shape by {percent} %"
-        )
+        lowered = f"would lower the radial stiffness of this shape by {number(100.0 * decrease, 2)} %"
+        sentence = f"the model assumes incompressible rubber; a bulk modulus of 2 GPa {lowered}"
         yield Caveat("incompressible", sentence).about(place)
 
 

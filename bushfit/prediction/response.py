@@ -228,11 +228,9 @@ def _warnings(result: Result, response: TimeResponse, left_out: list[str]) -> li
     strokes, (unit, factor) = np.abs(history.turning.strides), place.display.displacement
     start = abs(float(history.value[0]))
     if not history.periodic and start > _JUMP * np.abs(np.diff(history.value)).max():
-        sentence = (
-            f"the history begins at {number(factor * start, 3)} {unit}, but the model starts from rest at 0. "
-            "Begin the history at rest, or subtract its first value"
-        )
-        of_motion.append(Caveat("motion_begins_off_zero", sentence))
+        sentence = f"the history begins at {number(factor * start, 3)} {unit}, but the model starts from rest at 0"
+        advice = "Begin the history at rest, or subtract its first value"
+        of_motion.append(Caveat("motion_begins_off_zero", f"{sentence}. {advice}"))
     shortest = 2.0 * (1.0 - MARGIN) * result.measured.strain[0] / response.unit_strain if result.measured else 0.0
     short = strokes[strokes < shortest].sum() / max(strokes.sum(), np.finfo(float).tiny)
     if np.mean(strokes < _NOISE * np.ptp(history.value)) > _MOST_NOISE:
@@ -245,15 +243,10 @@ def _warnings(result: Result, response: TimeResponse, left_out: list[str]) -> li
         )
         of_motion.append(Caveat("noisy_motion", sentence))
     elif short > _MOST_SHORT:
-        sentence = (
-            f"{number(100.0 * short, 2)} % of the travel is in strokes shorter than the shortest tested, "
-            f"{number(factor * shortest / (1.0 - MARGIN), 3)} {unit}: {BEYOND}"
-        )
-        of_motion.append(Caveat("extrapolated_stroke", sentence))
+        stroke = f"strokes shorter than the shortest tested, {number(factor * shortest / (1.0 - MARGIN), 3)} {unit}"
+        sentence = f"{number(100.0 * short, 2)} % of the travel is in {stroke}"
+        of_motion.append(Caveat("extrapolated_stroke", f"{sentence}: {BEYOND}"))
     if not history.periodic and (samples := 1.0 / (history.frequency * history.step)) < _FEWEST_PER_CYCLE:
-        sentence = (
-            f"the history has {number(samples, 2)} samples in a mean cycle, too few for the force between "
-            "samples: sample it more finely"
-        )
-        of_motion.append(Caveat("coarse_motion", sentence))
+        sentence = f"the history has {number(samples, 2)} samples in a mean cycle, too few for the force between"
+        of_motion.append(Caveat("coarse_motion", f"{sentence} samples: sample it more finely"))
     return [*warnings, *(warning.about(place) for warning in of_motion)]

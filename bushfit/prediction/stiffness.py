@@ -186,10 +186,8 @@ def point_warnings(
         percent = format_deviation(stiffness / np.abs(measured))
         loss_difference = prediction.loss_factor.value - measured.imag / measured.real
         ends = [number(end, 2, "+") for end in (np.nanmin(loss_difference), np.nanmax(loss_difference))]
-        sentence = (
-            f"without {join_names(rig)} the predicted stiffness is {percent}, and the predicted loss factor "
-            f"{' to '.join(ends)}, compared with the measured values"
-        )
+        both = f"the predicted stiffness is {percent}, and the predicted loss factor {' to '.join(ends)}"
+        sentence = f"without {join_names(rig)} {both}, compared with the measured values"
         yield Caveat("rig_difference", sentence).about(place)
     if prediction.if_in_rig and not np.allclose(prediction.if_in_rig.stiffness.value, stiffness, rtol=_SAME):
         percent = format_deviation(prediction.if_in_rig.stiffness.value / stiffness)

@@ -97,10 +97,8 @@ class LargeMotion:
 def correction_factor(model: Model, points: OperatingPoints) -> Array:
     """Complex ratio of the stiffness of a model with and without its smooth unnamed correction, at n points, (n,)."""
     place, frequency, amplitude, conditions = points
-    corrected, without = (
-        source.stiffness(place, frequency, amplitude, conditions=conditions)
-        for source in (model, model.without(UNNAMED))
-    )
+    models = model, model.without(UNNAMED)
+    corrected, without = (one.stiffness(place, frequency, amplitude, conditions=conditions) for one in models)
     return np.asarray(corrected / without)
 
 

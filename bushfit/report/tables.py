@@ -94,10 +94,8 @@ def prediction_table(prediction: Prediction, display: Display | None = None) -> 
         f"storage {force}": ("storage_stiffness", factor),
         f"loss {force}": ("loss_stiffness", factor),
     }
-    columns: dict[str, Any] = {
-        "frequency [Hz]": prediction.frequency,
-        f"{motion_name} [{length}]": prediction.amplitude * length_factor,
-    }
+    columns: dict[str, Any] = {"frequency [Hz]": prediction.frequency}
+    columns[f"{motion_name} [{length}]"] = prediction.amplitude * length_factor
     bands = [band_columns(name, getattr(prediction, key), scale) for name, (key, scale) in quantities.items()]
     columns |= {name: band[name] for name, band in zip(quantities, bands, strict=True)}
     for band in bands:
@@ -170,10 +168,8 @@ def static_table(curve: StaticCurve) -> pd.DataFrame:
     """
     (length, to_length), (_, to_force), (_, to_stiffness) = curve.direction.display
     _, stiffness, force = response_headers(curve.direction)
-    columns: dict[str, Any] = {
-        displacement_header(curve.direction): curve.displacement * to_length,
-        f"rate [{length}/min]": 60.0 * curve.rate * to_length,
-    }
+    columns: dict[str, Any] = {displacement_header(curve.direction): curve.displacement * to_length}
+    columns[f"rate [{length}/min]"] = 60.0 * curve.rate * to_length
     for header, band, scale in (
         (force, curve.mean, to_force),
         (f"loading {force}", curve.loading, to_force),
