@@ -91,12 +91,11 @@ def time_model(request: ExportRequest) -> TimeModel:
     for effect in model.records:
         has_law = isinstance(effect, Modifier) or fields_of(effect) or (isinstance(effect, Branch) and effect.size)
         if effect.harmonic_only or not has_law:
+            steady = "a law for the steady first harmonic only"
             raise ModelError(
                 "an FMU follows a motion through time, for which this effect has no law",
                 place=effect.name,
-                found="a law for the steady first harmonic only"
-                if effect.harmonic_only
-                else "a law that the FMU sources lack",
+                found=steady if effect.harmonic_only else "a law that the FMU sources lack",
                 expected="effects whose force can be computed over time",
                 hint="fit a model without it, or export the stiffness over frequency and amplitude in another format",
             )

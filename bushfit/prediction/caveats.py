@@ -65,11 +65,9 @@ def caveats(result: Result) -> Iterator[Caveat]:
     if "springpot" not in result.model.effects:
         yield Caveat("no_springpot", "the model has no springpot: its stiffness does not depend on frequency")
     if unnamed := result.model.unnamed:
-        yield Caveat(
-            "correction_fades",
-            "the smooth correction follows the measurement, not a law. Outside the measured range, it fades "
-            f"and the band widens by up to ±{number(100.0 * Z95 * unnamed.far_deviation, 2)} %",
-        )
+        sentence = "the smooth correction follows the measurement, not a law. Outside the measured range, it fades"
+        widening = number(100.0 * Z95 * unnamed.far_deviation, 2)
+        yield Caveat("correction_fades", f"{sentence} and the band widens by up to ±{widening} %")
         yield Caveat(
             "correction_may_be_rig",
             "the smooth correction is assigned to the bushing, but these tests cannot distinguish it "

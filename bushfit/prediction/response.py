@@ -121,13 +121,8 @@ def time_response(
     """
     conditions = rubber_conditions(result, place, temperature)
     left_out = {effect.name for effect in result.model.records if history.periodic and effect.is_transient}
-    timed = replace(
-        result,
-        model=result.model.without(*left_out),
-        alternatives=tuple(
-            replace(alternative, model=alternative.model.without(*left_out)) for alternative in result.alternatives
-        ),
-    )
+    others = tuple(replace(other, model=other.model.without(*left_out)) for other in result.alternatives)
+    timed = replace(result, model=result.model.without(*left_out), alternatives=others)
     models, untimed = models_with_time_law(timed, str(place), rig=rig)
     force = envelope([_force(source, model, place, history, conditions) for source, model in models])
     tested = None

@@ -139,16 +139,10 @@ def predict(
     else:
         models, untimed, together = agreeing_models(result, rig=rig), [], iter(())
     predictions = [predict_with_model(source, model, points, over) for source, model in models]
-    bands: dict[str, Any] = {
-        name: envelope([getattr(prediction, name) for prediction in predictions]) for name in _BANDS
-    }
-    prediction = replace(
-        predictions[0],
-        **bands,
-        if_in_rig=predictions[2 ** len(result.unresolved) - 1] if result.unresolved and not rig else None,
-        measured=None if sweeps is None else measured_stiffness(points, sweeps),
-        over=over,
-    )
+    bands: dict[str, Any] = {name: envelope([getattr(one, name) for one in predictions]) for name in _BANDS}
+    in_rig = predictions[2 ** len(result.unresolved) - 1] if result.unresolved and not rig else None
+    measured = None if sweeps is None else measured_stiffness(points, sweeps)
+    prediction = replace(predictions[0], **bands, if_in_rig=in_rig, measured=measured, over=over)
     compared = replace(prediction, measured=None) if rig else prediction
     warnings = point_warnings(result, compared, temperature, preload)
     return replace(prediction, warnings=(*warnings, *together, *untimed))

@@ -117,11 +117,9 @@ def column_titles(table: pd.DataFrame, result: Result, diagnosis: Mapping[str, A
     Returns:
         Titles by the keys "before" and, if the diagnosis changes anything, "after".
     """
-    changed = any(
-        not np.allclose(table[name], table[str(name).replace("before", "after")], equal_nan=True)
-        for name in table
-        if str(name).endswith("before [%]")
-    )
+    headers = [str(header) for header in table if str(header).endswith("before [%]")]
+    pairs = ((table[header], table[header.replace("before", "after")]) for header in headers)
+    changed = not all(np.allclose(*pair, equal_nan=True) for pair in pairs)
     names = {"before": "before", "after": "after"}
     if not changed:
         names = {"before": "nothing added"}
