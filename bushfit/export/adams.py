@@ -89,11 +89,10 @@ class _Element(NamedTuple):
             exact.append(table.stiffness)
         element, model = np.concatenate(written), np.concatenate(exact)
         loss = number(float(np.max(np.abs(loss_factor(element) - loss_factor(model)))), 2)
-        return Caveat(
-            "format_error",
-            f"{self.reference.direction}, {kind}: a static curve, with the damping at {number(self.frequency, 4)} Hz: "
-            f"the error of |K| is {format_deviation(np.abs(element / model))}, of the loss factor up to {loss}",
-        )
+        place, hertz = self.reference.direction, number(self.frequency, 4)
+        subject = f"{place}, {kind}: a static curve, with the damping at {hertz} Hz"
+        errors = f"the error of |K| is {format_deviation(np.abs(element / model))}, of the loss factor up to {loss}"
+        return Caveat("format_error", f"{subject}: {errors}")
 
 
 def export(request: ExportRequest) -> Exported:

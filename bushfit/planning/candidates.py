@@ -7,13 +7,11 @@ import numpy as np
 
 from bushfit.campaign.schema import RigSettings
 from bushfit.campaign.simulated import SimulatedLoop, SimulatedSweep
-from bushfit.caveat import Caveat
 from bushfit.diagnosis.next_test import within_limits
 from bushfit.errors import ModelError
-from bushfit.geometry import TRANSLATION, Direction, Place, bushing_at
+from bushfit.geometry import Direction, Place, bushing_at
 from bushfit.planning.contract import Knowledge, PlanRequest, Test, operating_points
 from bushfit.simulation.undisturbed import PAPER_LOOPS, PAPER_SWEEPS
-from bushfit.units import number
 
 #: Cycles of the candidate loops: few, and enough to make the noise of the rows negligible.
 _LOOP_CYCLES = (3, 20)
@@ -145,31 +143,3 @@ def _tests_within_limits(knowledge: Knowledge, rig: RigSettings, tests: Sequence
             by_frequency = test.stepped == "frequency"
             possible.append(replace(test, frequencies=steps) if by_frequency else replace(test, amplitudes=steps))
     return possible
-
-
-def unlimited_rig_warning(knowledge: Knowledge, rig: RigSettings, tests: Sequence[Test]) -> Caveat | None:
-    """Warning on the velocity, acceleration and force that a plan reaches if [rig] states no limits.
-
-    Args:
-        knowledge: model that predicts the forces.
-        rig: limits of the rig.
-        tests: runs of the plan.
-
-    Returns:
-        Warning; None if [rig] states a limit, or the plan has no test with a displacement.
-    """
-    points = [(test.direction, *operating_points(test)) for test in tests if test.direction.motion is TRANSLATION]
-    if not points or any((rig.max_force, rig.max_displacement, rig.max_velocity, rig.max_frequency)):
-        return None
-    frequency, amplitude = np.concatenate([pair for _, *pair in points], axis=1)
-    fastest = int(np.argmax(frequency * amplitude))
-    velocity = 2.0 * np.pi * float(frequency[fastest] * amplitude[fastest])
-    acceleration = float(np.max(np.square(2.0 * np.pi * frequency) * amplitude)) / 9.80665
-    force = max(float(np.max(np.abs(knowledge.model.stiffness(place, f, x)) * x)) for place, f, x in points)
-    point = f"{number(1e3 * amplitude[fastest], 3)} mm at {number(frequency[fastest], 3)} Hz"
-    return Caveat(
-        "plan_without_limits",
-        f"[rig] states no limits: the plan reaches {number(velocity, 3)} m/s ({point}), "
-        f"{number(acceleration, 3)} g and {number(force, 3)} N. State max_velocity, max_force, max_displacement and "
-        "max_frequency, and plan again",
-    )

@@ -8,8 +8,8 @@ import numpy as np
 
 from bushfit.caveat import Caveat, join_names
 from bushfit.errors import ModelError
-from bushfit.planning.candidates import unlimited_rig_warning
-from bushfit.planning.contract import Knowledge, PlanRequest, Test
+from bushfit.geometry import TRANSLATION
+from bushfit.planning.contract import Knowledge, PlanRequest, Test, operating_points
 from bushfit.planning.document import PlanFile, plan_document
 from bushfit.planning.exchange import add_runs
 from bushfit.planning.search import RIVALS_APART, PlanSearch
@@ -198,18 +198,24 @@ def plan_warnings(search: PlanSearch) -> Iterator[Caveat]:
         Iterator over warnings.
     """
     knowledge, request, counts = search.knowledge, search.request, search.counts
-    tests = [search.tests[test] for test in np.flatnonzero(counts)]
-    if warning := unlimited_rig_warning(knowledge, request.rig, tests):
-        yield warning
+    rig, tests = request.rig, [search.tests[test] for test in np.flatnonzero(counts)]
+    points = [(test.direction, *operating_points(test)) for test in tests if test.direction.motion is TRANSLATION]
+    if points and not any((rig.max_force, rig.max_displacement, rig.max_velocity, rig.max_frequency)):
+        frequency, amplitude = np.concatenate([pair for _, *pair in points], axis=1)
+        fastest = int(np.argmax(frequency * amplitude))
+        velocity = 2.0 * np.pi * float(frequency[fastest] * amplitude[fastest])
+        acceleration = float(np.max(np.square(2.0 * np.pi * frequency) * amplitude)) / 9.80665
+        force = max(float(np.max(np.abs(knowledge.model.stiffness(place, f, x)) * x)) for place, f, x in points)
+        point = f"{number(1e3 * amplitude[fastest], 3)} mm at {number(frequency[fastest], 3)} Hz"
+        reached = f"{number(velocity, 3)} m/s ({point}), {number(acceleration, 3)} g and {number(force, 3)} N"
+        advice = "State max_velocity, max_force, max_displacement and max_frequency, and plan again"
+        yield Caveat("plan_without_limits", f"[rig] states no limits: the plan reaches {reached}. {advice}")
     stiffnesses = (quantity for quantity in search.predictions if quantity.name.startswith("stiffness"))
     model_error = max((float(quantity.model_error.max()) for quantity in stiffnesses), default=0.0)
     if model_error > _NOTABLE_RATIO - 1.0 and not knowledge.rivals:
-        yield Caveat(
-            "plan_model_error",
-            f"the errors of the stiffness include the model error, up to {number(100.0 * model_error, 2)} %, "
-            "which further tests do not reduce. bushfit diagnose looks for the missing effect; "
-            "to plan with it, give its model.json to bushfit plan",
-        )
+        sentence = f"the errors of the stiffness include the model error, up to {number(100.0 * model_error, 2)} %"
+        advice = "bushfit diagnose looks for the missing effect; to plan with it, give its model.json to bushfit plan"
+        yield Caveat("plan_model_error", f"{sentence}, which further tests do not reduce. {advice}")
     yield from knowledge.result.warnings
     if knowledge.bounded:
         sentence = f"{join_names(knowledge.bounded)} ended at a bound: the planned errors of the other parameters"

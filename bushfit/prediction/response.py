@@ -1,5 +1,6 @@
 """Force over time for a displacement history, from the laws in time, with its 95 % band."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -188,44 +189,45 @@ def _force(result: Result, model: Model, place: Place, history: History, conditi
     return Band(force, force - half, force + half)
 
 
-def _warnings(result: Result, response: TimeResponse, left_out: list[str]) -> list[Caveat]:
-    """Warnings on a time response: directions and ranges that were not fitted, effects left out, and coarse sampling.
+def _warnings(result: Result, response: TimeResponse, left_out: list[str]) -> Iterator[Caveat]:
+    """Yield warnings on a time response: directions and ranges not fitted, effects left out, and coarse sampling.
 
     Args:
         result: fitted result.
         response: predicted force over time.
         left_out: names of the effects that the response leaves out.
     """
-    place, history, of_motion = response.direction, response.history, list[Caveat]()
-    warnings = [*result.undecided, *unfitted_warnings(result, place)]
+    place, history = response.direction, response.history
+    yield from result.undecided
+    yield from unfitted_warnings(result, place)
     if result.measured:
         largest = max(np.abs(history.value).max(), result.measured.strain[0] / response.unit_strain)
         point = np.array([history.frequency]), np.array([largest])
-        warnings += extrapolations(result, OperatingPoints(place, *point, response.conditions))
+        yield from extrapolations(result, OperatingPoints(place, *point, response.conditions))
     if response.tested and (share := response.summary["share_of_time_above_tested_strain_rate"]):
         ends = [number(rate, 3) for rate in (response.summary["largest_strain_rate_per_s"], response.tested[1])]
         rates = f"strain rates up to {ends[0]} 1/s, but fitted at up to {ends[1]} 1/s only"
         sentence = f"{rates}, in {number(100.0 * share, 2)} % of time: {BEYOND}"
-        of_motion.append(Caveat("extrapolated_rate", sentence))
+        yield Caveat("extrapolated_rate", sentence).about(place)
     if (result.model.unnamed or result.model_error) and "friction" in result.model.effects:
         sentence = (
             "friction laws that agree in sines can differ in a mixed motion by more than the band. Judge the "
             "model by a measured force ([[validation]]), or compare it with a fit with --effect distributed_sliders"
         )
-        of_motion.append(Caveat("friction_laws_differ", sentence))
+        yield Caveat("friction_laws_differ", sentence).about(place)
     if left_out:
         sentence = f"{join_names(left_out)} left out, because no law describes this motion"
-        of_motion.append(Caveat("effects_without_law", sentence))
+        yield Caveat("effects_without_law", sentence).about(place)
     if constant := result.model.constant_modifiers:
         unit, factor = place.display.displacement
         sine = f"{number(history.frequency, 3)} Hz and {number(factor * history.amplitude.item(), 3)} {unit}"
-        of_motion.append(Caveat("constant_effects", f"{join_names(constant)} constant, as in a sine of {sine}"))
+        yield Caveat("constant_effects", f"{join_names(constant)} constant, as in a sine of {sine}").about(place)
     strokes, (unit, factor) = np.abs(history.turning.strides), place.display.displacement
     start = abs(float(history.value[0]))
     if not history.periodic and start > _JUMP * np.abs(np.diff(history.value)).max():
         sentence = f"the history begins at {number(factor * start, 3)} {unit}, but the model starts from rest at 0"
         advice = "Begin the history at rest, or subtract its first value"
-        of_motion.append(Caveat("motion_begins_off_zero", f"{sentence}. {advice}"))
+        yield Caveat("motion_begins_off_zero", f"{sentence}. {advice}").about(place)
     shortest = 2.0 * (1.0 - MARGIN) * result.measured.strain[0] / response.unit_strain if result.measured else 0.0
     short = strokes[strokes < shortest].sum() / max(strokes.sum(), np.finfo(float).tiny)
     if np.mean(strokes < _NOISE * np.ptp(history.value)) > _MOST_NOISE:
@@ -236,12 +238,11 @@ def _warnings(result: Result, response: TimeResponse, left_out: list[str]) -> li
             f"{unit} rms, and friction follows each of them. To smooth the displacement and keep the motion, "
             f"use --lowpass {cutoff}"
         )
-        of_motion.append(Caveat("noisy_motion", sentence))
+        yield Caveat("noisy_motion", sentence).about(place)
     elif short > _MOST_SHORT:
         stroke = f"strokes shorter than the shortest tested, {number(factor * shortest / (1.0 - MARGIN), 3)} {unit}"
         sentence = f"{number(100.0 * short, 2)} % of the travel is in {stroke}"
-        of_motion.append(Caveat("extrapolated_stroke", f"{sentence}: {BEYOND}"))
+        yield Caveat("extrapolated_stroke", f"{sentence}: {BEYOND}").about(place)
     if not history.periodic and (samples := 1.0 / (history.frequency * history.step)) < _FEWEST_PER_CYCLE:
         sentence = f"the history has {number(samples, 2)} samples in a mean cycle, too few for the force between"
-        of_motion.append(Caveat("coarse_motion", f"{sentence} samples: sample it more finely"))
-    return [*warnings, *(warning.about(place) for warning in of_motion)]
+        yield Caveat("coarse_motion", f"{sentence} samples: sample it more finely").about(place)

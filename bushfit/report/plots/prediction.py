@@ -80,18 +80,17 @@ def prediction_figure(
         draw_prediction(pair, fine, rig, points, axis, levels)
         for pair, (axis, levels) in zip(grid[len(free) :], panels, strict=True)
     ]
-    band = ["Lines: model.", "Lines: model; shaded: 95 % band, if it is wider than the line."]
-    sentences = [band[bool(np.any(fine.stiffness.high > fine.stiffness.low))]]
-    if any(laid) and rig:
-        sentences.append("Thin lines: the model with the effects of the rig, as the points were measured.")
-    if fine.if_in_rig:
-        names = " and ".join(result.unresolved)
-        sentences.append(f"Double lines: the model if {names} belongs to the rig; the band includes both.")
-    if amplitudes.size > _MOST_LEVELS["frequency"]:
-        sentences.append(f"{_MOST_LEVELS['frequency']} of {amplitudes.size} amplitudes are drawn.")
-    if of_place is not None and (any(laid) or free):
-        sentences.append(points_note(of_place))
-    return figure.explain(*sentences, note=note)
+    has_band = bool(np.any(fine.stiffness.high > fine.stiffness.low))
+    return figure.explain(
+        "Lines: model; shaded: 95 % band, if it is wider than the line." if has_band else "Lines: model.",
+        "Thin lines: the model with the effects of the rig, as the points were measured." * bool(any(laid) and rig),
+        f"Double lines: the model if {' and '.join(result.unresolved)} belongs to the rig; the band includes both."
+        * bool(fine.if_in_rig),
+        f"{_MOST_LEVELS['frequency']} of {amplitudes.size} amplitudes are drawn."
+        * (amplitudes.size > _MOST_LEVELS["frequency"]),
+        points_note(of_place) if of_place is not None and (any(laid) or free) else "",
+        note=note,
+    )
 
 
 @style.fixed_settings()
