@@ -87,10 +87,10 @@ def agreeing_models(result: Result, *, rig: bool = False) -> list[tuple[Result, 
     """
     models = [(result, model) for model in ([result.model] if rig else car_models(result.model, result.unresolved))]
     resolved = {*result.model.effects} - {*result.unresolved}
-    for other in result.alternatives:
-        explained = replace(result, model=other.model, model_error=None, covariance=other.covariance)
-        twins = [effect.name for effect in other.model.records if effect.twins and effect.name not in resolved]
-        models += [(explained, model) for model in ([other.model] if rig else car_models(other.model, twins))]
+    for rival in result.alternatives:
+        explained = replace(result, model=rival.model, model_error=None, covariance=rival.covariance)
+        twins = [effect.name for effect in rival.model.records if effect.twins and effect.name not in resolved]
+        models += [(explained, model) for model in ([rival.model] if rig else car_models(rival.model, twins))]
     return models
 
 

@@ -122,8 +122,8 @@ def time_response(
     """
     conditions = rubber_conditions(result, place, temperature)
     left_out = {effect.name for effect in result.model.records if history.periodic and effect.is_transient}
-    others = tuple(replace(other, model=other.model.without(*left_out)) for other in result.alternatives)
-    timed = replace(result, model=result.model.without(*left_out), alternatives=others)
+    rivals = tuple(replace(rival, model=rival.model.without(*left_out)) for rival in result.alternatives)
+    timed = replace(result, model=result.model.without(*left_out), alternatives=rivals)
     models, untimed = models_with_time_law(timed, str(place), rig=rig)
     force = envelope([_force(source, model, place, history, conditions) for source, model in models])
     tested = None
