@@ -17,7 +17,7 @@ from bushfit.fitting.problem import FitResult
 from bushfit.fitting.repeats import to_unit_interval
 from bushfit.model.model import Model
 from bushfit.reading.preload import add_preload
-from bushfit.units import number
+from bushfit.units import format_range, number
 
 #: Smallest smooth misfit (root mean square, in units of its noise) of a region that is listed.
 _WORTH_A_LINE = 2.5
@@ -162,10 +162,10 @@ def _describe_sweep_misfit(
     is_everywhere = len(agreeing) == len(lines)
     levels = f"every {fixed_axis}" if is_everywhere else ", ".join(dict.fromkeys(labels[i] for i in agreeing))
     unit, factor = ("Hz", 1.0) if stepped != "amplitude" else direction.display.displacement
-    ends = " to ".join(dict.fromkeys(f"{factor * end:.3g}" for end in spans[stepped == "amplitude"]))
+    span = format_range(unit, *(factor * end for end in spans[stepped == "amplitude"]))
     sentences = [
         f"measured {direction} {quantity} is up to {number(100 * abs(largest), 2)} % of |K| {sides[0]} the model "
-        f"({ends} {unit}, at {levels})"
+        f"({span}, at {levels})"
     ]
     means = [float(np.mean(piece)) for piece in pieces]
     if across:
