@@ -156,9 +156,10 @@ def with_model_error(
     if error.rms >= SIZES[-1]:
         return plain_fit, None
     weighed = [test.with_model_error(size) for test in plain_fit.covariance_tests or with_levels]
-    fitted, likeliest_size = closest.reevaluate(closest.model, weighed), likeliest.maximum[1]
-    process = Discrepancy.over_tests(FittedTests(fitted), likeliest.groups, likeliest.lengths, MAXIMUM_NODES)
+    shape, likeliest_size = (likeliest.groups, likeliest.lengths), likeliest.maximum[1]
     freedom = likeliest.likelihood.freedom(likeliest_size)
+    del tests, processes, likeliest  # their residuals take as much memory as those of the next step
+    process = Discrepancy.over_tests(FittedTests(closest.reevaluate(closest.model, weighed)), *shape, MAXIMUM_NODES)
     smooth_error = SmoothError(likeliest_size * process.columns, process.tests.project, freedom)
     closest = replace(closest, noise_weighted=plain_fit.data_sets, outliers=plain_fit.outliers)
     return replace(closest, covariance_tests=weighed, smooth_error=smooth_error), error
