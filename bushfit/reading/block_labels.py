@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING
 from bushfit import units
 from bushfit.caveat import Caveat
 from bushfit.geometry import Place, Specimen
-from bushfit.reading.headers import COUNTED, HINTS, SWEEP_COLUMNS, Vocabulary, plain_name, split_unit
+from bushfit.reading.channel_lists import SCALES
+from bushfit.reading.headers import COUNTED, HINTS, SWEEP_COLUMNS, Vocabulary, plain, plain_name, split_unit
 from bushfit.reading.layout import STEPS
 from bushfit.reading.lines import Line, is_summary_row
 from bushfit.reading.names import (
@@ -26,7 +27,7 @@ from bushfit.reading.names import (
     named_quantities,
     names_coupon,
 )
-from bushfit.reading.numerals import is_like_number, without_groups
+from bushfit.reading.numerals import is_like_number, plainest_value, without_groups
 from bushfit.reading.roles import CONDITIONS
 from bushfit.reading.source import cells_of
 
@@ -96,6 +97,11 @@ def find_remarks(table: Table) -> tuple[Caveat, ...]:
     """
     remarks = ((line.number, line.text[:_LONGEST_QUOTE]) for line in table.lines_above if is_remark(line.text))
     warnings = [Caveat("remark", f'line {number} is not understood: "{text}"') for number, text in remarks]
+    for line in table.lines_above:
+        name, *cells = [str(cell) for cell in cells_of(line, table.layout.delimiter)] or [""]
+        if plain(name) in SCALES and any(plainest_value(cell) != 1.0 for cell in cells if is_like_number(cell)):
+            sentence = f'line {line.number} is not used: "{line.text[:_LONGEST_QUOTE]}"; {HINTS["scales"]}'
+            warnings.append(Caveat("remark", sentence))
     names = [Line(0, name.replace("_", " ")) for name in (table.source.sheet, table.file.stem) if name]
     for line in [*names, *(table.lines_above if table.first_decimal is None else ())]:
         forms = [plain_numbers(line, mark) for mark in ".,"]

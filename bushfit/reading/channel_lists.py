@@ -15,7 +15,7 @@ _LISTED_NAME = re.compile(
     re.IGNORECASE,
 )
 #: Names of a column with the size of one count of a channel.
-_SCALES = frozenset(map(plain, WORDS["rows_of"]["scales"]))
+SCALES = frozenset(map(plain, WORDS["rows_of"]["scales"]))
 
 
 def listed_names(
@@ -54,8 +54,8 @@ def scales_above(lines: Iterable[Sequence[str]], headers: Sequence[str]) -> dict
     scales = dict[int, str]()
     for cells in lines:
         names = list(map(plain, cells))
-        if _SCALES.intersection(names) and UNIT_NAMES.intersection(names):
-            scale, unit = (next(n for n, name in enumerate(names) if name in words) for words in (_SCALES, UNIT_NAMES))
+        if SCALES.intersection(names) and UNIT_NAMES.intersection(names):
+            scale, unit = (next(n for n, name in enumerate(names) if name in words) for words in (SCALES, UNIT_NAMES))
         elif scale is not None and unit is not None and len(cells) > max(scale, unit) and is_like_number(cells[scale]):
             matching = [n for n, header in enumerate(headers) if header in cells]
             scales |= dict.fromkeys(matching, f"x {cells[scale]} {cells[unit]}")
