@@ -50,7 +50,7 @@ _Read = TypeVar("_Read")
     option("--outer-radius LENGTH"),
     option("--outer-diameter LENGTH", 'Radius or diameter where the rubber meets the outer sleeve, such as "36 mm".'),
     option("--length LENGTH", 'Length of the rubber along the axis, such as "34 mm" (mean of inner and outer length).'),
-    option("--name NAME", "Name of the bushing [name of the folder of the first file]."),
+    option("--name NAME", "Name of the bushing [folder of the first file]."),
 )
 @metadata_options()
 @option_group("Output", flag("--no-input", "Ask no questions; report missing information as an error."))
@@ -59,9 +59,9 @@ def command(files: tuple[Path, ...], name: str | None, no_input: bool, output: O
     """Write a campaign from test files and the geometry of the bushing.
 
     A campaign is a text file of a bushing and its tests. FILE is a test file, a workbook or a folder. In a terminal,
-    init asks for missing information. An option applies to all files. Writes campaign.toml, or the file given by
-    -o my_bushing.toml; for several parts, a campaign each and batch.toml. For several bushings of one compound, give
-    the files of one bushing, and add the others under [[bushings]] (see configs/reference.toml).
+    init asks for missing information. An option applies to all files. Writes campaign.toml, or the file given by -o;
+    for several parts, a campaign each and batch.toml. For several bushings of one compound, give the files of one, and
+    add the others under [[bushings]].
     """
     from bushfit.campaign.strain import implausible_strain
     from bushfit.geometry import Specimen

@@ -160,16 +160,30 @@ def _describe_sweep_misfit(
     across = [i for i, piece in enumerate(pieces) if np.max(-np.sign(largest) * piece) > _STRONG * abs(largest)]
     agreeing = [i for i in touched if i == worst or i not in across]
     is_everywhere = len(agreeing) == len(lines)
-    levels = f"every {fixed_axis}" if is_everywhere else ", ".join(dict.fromkeys(labels[i] for i in agreeing))
     unit, factor = ("Hz", 1.0) if stepped != "amplitude" else direction.display.displacement
+
+    def name_levels(found: Sequence[int]) -> str:
+        """Name levels by their amplitude or frequency, without repetition."""
+        return ", ".join(dict.fromkeys(labels[i] for i in found))
+
+    def range_on_side(found: Sequence[int], sign: float) -> str:
+        """Range of the points of some levels whose misfit has the given sign and is not small."""
+        steps = [lines[i].step[sign * pieces[i] > _STRONG * abs(largest)] for i in found]
+        ends = np.concatenate(steps)
+        return format_range(unit, factor * float(ends.min()), factor * float(ends.max()))
+
     span = format_range(unit, *(factor * end for end in spans[stepped == "amplitude"]))
+    if across:
+        span = range_on_side(agreeing, np.sign(largest))
+    levels = f"every {fixed_axis}" if is_everywhere and len(lines) > 1 else name_levels(agreeing)
     sentences = [
         f"measured {direction} {quantity} is up to {number(100 * abs(largest), 2)} % of |K| {sides[0]} the model "
         f"({span}, at {levels})"
     ]
     means = [float(np.mean(piece)) for piece in pieces]
     if across:
-        sentences.append(f"It is {sides[1]} the model at {', '.join(dict.fromkeys(labels[i] for i in across))}")
+        span = range_on_side(across, -np.sign(largest))
+        sentences.append(f"It is {sides[1]} the model ({span}, at {name_levels(across)})")
     elif is_everywhere and len(means) > 1 and np.ptp(means) >= _CHANGES * max(abs(mean) for mean in means):
         sentences.append(f"The gap {_trend_verb(means[0], means[-1])} with {fixed_axis}")
     trend = _trend(stepped or "frequency", line.step, pieces[worst])
