@@ -88,7 +88,7 @@ def test_a_parameter_on_a_bound_of_its_fit_passes_on_condition_and_is_named(type
     assert "the maximum that the fit allows" in held["undecided limits"]
     assert ": the fit ends at a bound" in done.stderr
     assert "mu of b1" in done.stderr
-    assert "b1 passes conditionally: mu 0.2 MPa" in done.stderr
+    assert "b1: mu 0.2 MPa" in done.stderr
     typed("batch", "bushings/b[013]/bushing.toml", "-o", "none", "--no-plots", "--effect", "inertia", "--json")
     assert json.loads((shop / "none/bushings/b1/model.json").read_text())["parameters"]["mu"]["at_bound"] == "max"
     assert not any("inertia" in row["at bound"] for row in rows(shop / "none")), "no mass is an answer"
