@@ -126,9 +126,7 @@ def _print_result(output: Output, result: BatchResult, folder: Path) -> None:
         "could not be evaluated": [f"{part.name} could not be evaluated: {part.error}" for part in parts if part.error],
         "differ": [f"{part.name} differs from the others: {part.differs}" for part in parts if part.differs],
         "pass conditionally": [
-            f"{part.name}: {'; '.join(part.doubtful.values())}"
-            for part in parts
-            if part.name in document.conditional
+            f"{part.name}: {'; '.join(part.doubtful.values())}" for part in parts if part.name in document.conditional
         ],
     }
     for attention, lines in sentences.items():

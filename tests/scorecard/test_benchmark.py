@@ -141,4 +141,4 @@ def test_baselines_name_what_is_plain(tmp_path):
 
 @pytest.mark.slow
 def test_a_planned_session_settles_what_was_left_open():
-    assert evaluate((1545993629, ("coupled_breakdown",)), 8.0) == "rightly"
+    assert evaluate((1777477785, ("rig_compliance",)), 8.0) == "rightly"
