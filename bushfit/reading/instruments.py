@@ -57,7 +57,7 @@ class Format(NamedTuple):
 _FORMATS = (
     Format("MATLAB", (".mat",), rb"MATLAB (?:5\.0|7\.3) MAT-file", read_matlab, HINTS["matlab"]),
     Format("HDF5", (".h5", ".hdf5"), rb"\x89HDF", read_matlab),
-    Format("JSON", (".ndjson", ".jsonl"), rb"(?:\xef\xbb\xbf)?\s*[\[{]\s*[\"\[{]", read_json),
+    Format("JSON", (".ndjson", ".jsonl"), rb"(?:\xef\xbb\xbf)?\s*(?:\[\s*)*\{\s*\"", read_json),
     Format("TDMS", (".tdms",), rb"TDSm", read_tdms),
     Format("UFF", (".uff", ".unv"), rb" {4}-1 *\r?\n +\d+", read_uff, HINTS["uff"]),
     Format("MDF", (".mf4", ".mdf"), rb"MDF     |UnFinMF ", read_mdf),
