@@ -150,10 +150,10 @@ def _print_summary(output: Output, predicted: PredictionOutput) -> None:
 
 def _print_static(output: Output, curve: StaticCurve) -> None:
     """Print the range and rate of a static curve, its stiffness over the range with its 95 % interval, and at zero."""
-    from bushfit.units import format_range, number
+    from bushfit.units import number
 
-    (unit, length), _, (name, factor) = curve.direction.display
-    reach = format_range(unit, length * curve.displacement[-1])
+    length, _, (name, factor) = curve.direction.display
+    reach = length.text(curve.displacement[-1])
     middle = curve.displacement.size // 2
     values = (curve.secant.value[0], curve.secant.low[0], curve.secant.high[0], curve.slope.value[middle])
     secant, low, high, slope = (number(factor * value, 4) for value in values)

@@ -97,10 +97,10 @@ def _print_range(output: Output, outcome: RunOutput) -> None:
         return
     output.console.print("tested range; outside this range the model extrapolates", style="bold")
     for direction in dict.fromkeys(data_set.direction for data_set in outcome.data.data_sets):
-        unit, factor = direction.display.displacement
         tests = [data_set for data_set in outcome.data.data_sets if data_set.direction == direction]
         frequencies = [end for test in tests for end in (test.frequency.min(), test.frequency.max())]
-        amplitudes = [factor * end for test in tests for end in (test.amplitude.min(), test.amplitude.max())]
+        ends = [end for test in tests for end in (test.amplitude.min(), test.amplitude.max())]
+        amplitude = direction.display.displacement.text(min(ends), max(ends))
         frequency = format_range("Hz", min(frequencies), max(frequencies))
         use = "" if str(direction) in measured.directions else ", not fitted"
-        output.print(f"  {direction}: {frequency}, {format_range(unit, min(amplitudes), max(amplitudes))}{use}")
+        output.print(f"  {direction}: {frequency}, {amplitude}{use}")

@@ -153,14 +153,13 @@ class ExportRequest:
             yield "temperature", f"{celsius} degC, assumed constant in time and in the whole bushing"
         if measured:
             for place in self.places:
-                unit, factor = place.display.displacement
                 fitted = str(place) in measured.directions
                 tests = [test for test in campaign.tests if test.place == str(place)] if campaign and fitted else []
                 strained = tuple(strain / model.unit_strain(place) for strain in measured.strain)
                 frequencies = np.array([test.frequency_Hz for test in tests] or measured.frequency)
-                amplitudes = factor * np.array([test.amplitude for test in tests] or strained)
+                amplitudes = np.array([test.amplitude for test in tests] or strained)
                 parts = [str(place), format_range("Hz", frequencies.min(), frequencies.max())]
-                parts.append(format_range(unit, amplitudes.min(), amplitudes.max()))
+                parts.append(place.display.displacement.text(amplitudes.min(), amplitudes.max()))
                 temperatures = [kelvin - CELSIUS for kelvin in measured.temperature or ()]
                 parts.append(format_range("degC", *temperatures) if temperatures else "temperature not stated")
                 parts.append("fitted" if fitted else "not fitted")

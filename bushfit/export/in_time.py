@@ -205,8 +205,7 @@ def _steady_omissions(
     error = float(np.max(np.abs(stiffness / prediction.complex_stiffness - 1.0)))
     if error < 1e-6 and not omitted:  # rounding
         return
-    unit, factor = place.display.displacement
-    point = f"{number(frequency, 3)} Hz and {number(factor * amplitude, 3)} {unit}"
+    point = f"{number(frequency, 3)} Hz and {place.display.displacement.text(amplitude)}"
     parts = [f"{', '.join(fixed)}, fixed as at {point}" if fixed else "", ", ".join(map(effect_label, omitted))]
     effects = "; ".join(filter(None, parts))
     sentence = f"{effects}: error of the stiffness up to {number(100.0 * error, 2)} % over the grid"

@@ -4,12 +4,23 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from bushfit.units import format_range
+
 
 class Unit(NamedTuple):
     """Unit of a quantity: a value in SI times `factor` is the value in this unit."""
 
     name: str
     factor: float
+
+    def text(self, *values: float, digits: int = 3) -> str:
+        """Format a positive value, or the ends of a range: "0.2 mm", "0.1 to 0.5 mm".
+
+        Args:
+            *values: values [SI].
+            digits: number of significant digits.
+        """
+        return format_range(self.name, *(self.factor * value for value in values), digits=digits)
 
 
 class Display(NamedTuple):

@@ -172,9 +172,8 @@ class PlannedQuantity:
         )
         location = ""
         if self.prediction:
-            unit, factor = self.prediction.direction.display.displacement
-            frequency, amplitude = self.prediction.frequency[worst], self.prediction.amplitude[worst]
-            location = f" at {format_range('Hz', frequency)} and {format_range(unit, factor * amplitude)}"
+            amplitude = self.prediction.direction.display.displacement.text(self.prediction.amplitude[worst])
+            location = f" at {format_range('Hz', self.prediction.frequency[worst])} and {amplitude}"
         return f"{format_half_width(size)}{location} comes from {cause}"
 
 

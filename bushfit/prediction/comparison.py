@@ -258,9 +258,8 @@ def _describe_difference(band: Band, unit: str, contrast: Contrast) -> str:
         value, ends = abs(band.value[i]), sorted((abs(band.low[i]), abs(band.high[i])))
         digits = int(np.clip(np.floor(np.log10(value)) - np.floor(np.log10(ends[1] - ends[0])) + 1, 2, _MOST_DIGITS))
         texts = format_aligned([value, *ends], digits)
-        amplitude_unit, factor = contrast.place.display.displacement
-        frequency, amplitude = contrast.reference.frequency[i], factor * contrast.reference.amplitude[i]
-        point = f"{format_range('Hz', frequency)}, {format_range(amplitude_unit, amplitude)}"
+        amplitude = contrast.place.display.displacement.text(contrast.reference.amplitude[i])
+        point = f"{format_range('Hz', contrast.reference.frequency[i])}, {amplitude}"
         return f"{texts[0]}{unit} ({texts[1]} to {texts[2]}) {word}", point
 
     if not len(band.root):

@@ -197,7 +197,7 @@ def _warnings(result: Result, response: TimeResponse, left_out: list[str]) -> It
         response: predicted force over time.
         left_out: names of the effects that the response leaves out.
     """
-    place, history = response.direction, response.history
+    place, history, length = response.direction, response.history, response.direction.display.displacement
     yield from result.undecided
     yield from unfitted_warnings(result, place)
     if result.measured:
@@ -219,13 +219,11 @@ def _warnings(result: Result, response: TimeResponse, left_out: list[str]) -> It
         sentence = f"{join_names(left_out)} left out, because no law describes this motion"
         yield Caveat("effects_without_law", sentence).about(place)
     if constant := result.model.constant_modifiers:
-        unit, factor = place.display.displacement
-        sine = f"{number(history.frequency, 3)} Hz and {number(factor * history.amplitude.item(), 3)} {unit}"
+        sine = f"{number(history.frequency, 3)} Hz and {length.text(history.amplitude.item())}"
         yield Caveat("constant_effects", f"{join_names(constant)} constant, as in a sine of {sine}").about(place)
-    strokes, (unit, factor) = np.abs(history.turning.strides), place.display.displacement
-    start = abs(float(history.value[0]))
+    strokes, start = np.abs(history.turning.strides), abs(float(history.value[0]))
     if not history.periodic and start > _JUMP * np.abs(np.diff(history.value)).max():
-        sentence = f"the history begins at {number(factor * start, 3)} {unit}, but the model starts from rest at 0"
+        sentence = f"the history begins at {length.text(start)}, but the model starts from rest at 0"
         advice = "Begin the history at rest, or subtract its first value"
         yield Caveat("motion_begins_off_zero", f"{sentence}. {advice}").about(place)
     shortest = 2.0 * (1.0 - MARGIN) * result.measured.strain[0] / response.unit_strain if result.measured else 0.0
@@ -234,13 +232,13 @@ def _warnings(result: Result, response: TimeResponse, left_out: list[str]) -> It
         noise, highest = noise_and_highest_frequency(history.value, history.step)
         cutoff = f'"{number(2.0 * highest, 2)} Hz"' if 4.0 * highest * history.step < 1.0 else "above all wanted motion"
         sentence = (
-            f"most reversals of the displacement are as small as its noise, {number(factor * noise, 2)} "
-            f"{unit} rms, and friction follows each of them. To smooth the displacement and keep the motion, "
+            f"most reversals of the displacement are as small as its noise, {length.text(noise, digits=2)} "
+            "rms, and friction follows each of them. To smooth the displacement and keep the motion, "
             f"use --lowpass {cutoff}"
         )
         yield Caveat("noisy_motion", sentence).about(place)
     elif short > _MOST_SHORT:
-        stroke = f"strokes shorter than the shortest tested, {number(factor * shortest / (1.0 - MARGIN), 3)} {unit}"
+        stroke = f"strokes shorter than the shortest tested, {length.text(shortest / (1.0 - MARGIN))}"
         sentence = f"{number(100.0 * short, 2)} % of the travel is in {stroke}"
         yield Caveat("extrapolated_stroke", f"{sentence}: {BEYOND}").about(place)
     if not history.periodic and (samples := 1.0 / (history.frequency * history.step)) < _FEWEST_PER_CYCLE:

@@ -18,7 +18,6 @@ from bushfit.prediction.caveats import extrapolations
 from bushfit.prediction.conditions import OperatingPoints, PredictedPlace, rubber_conditions
 from bushfit.prediction.superposed import correction_factor, models_with_time_law
 from bushfit.reading.preload import Preload
-from bushfit.units import number
 
 #: Default rate of a model without loops, in display units per minute (10 mm/min): common in static tests of rubber.
 _DEFAULT_RATE = 10.0
@@ -58,8 +57,7 @@ class StaticCurve(PredictedPlace):
     @property
     def rate_text(self) -> str:
         """Rate with its unit, such as "10 mm/min"."""
-        unit, factor = self.direction.display.displacement
-        return f"{number(60.0 * factor * self.rate, 3)} {unit}/min"
+        return f"{self.direction.display.displacement.text(60.0 * self.rate)}/min"
 
 
 def static_rate(result: Result, place: Place, rates: Mapping[str, float] | None = None) -> float:

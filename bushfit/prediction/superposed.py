@@ -41,8 +41,7 @@ class LargeMotion:
 
     def describe(self, place: Place) -> str:
         """Format the motion, such as "0.5 Hz 1 mm"."""
-        unit, factor = place.display.displacement
-        size = format_range(unit, factor * self.displacement)
+        size = place.display.displacement.text(self.displacement)
         return f"{number(self.frequency, 3)} Hz {size}" if self.frequency else size
 
     def stiffness_and_slopes(self, model: Model, points: OperatingPoints, names: Sequence[str]) -> tuple[Array, Array]:

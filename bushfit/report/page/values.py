@@ -13,7 +13,7 @@ from bushfit.prediction.static_curve import static_curve, static_rate
 from bushfit.prediction.stiffness import Prediction, predict
 from bushfit.prediction.superposed import untimed_effects
 from bushfit.report.tables import spread_indices
-from bushfit.units import CELSIUS, display_unit, format_aligned, format_range, number
+from bushfit.units import CELSIUS, display_unit, format_aligned, number
 
 #: Highest frequency at which a stiffness is reported as static [Hz].
 _STATIC = 1.0
@@ -53,7 +53,7 @@ def headline_texts(result: Result, point: Prediction) -> dict[str, str]:
         stiffness and dynamic stiffening.
     """
     place, frequency, amplitude = point.direction, float(point.frequency[0]), float(point.amplitude[0])
-    (length, to_length), _, (name, factor) = place.display
+    length, _, (name, factor) = place.display
     lowest = min([*(result.measured.frequency[:1] if result.measured else ()), frequency])
     unit, to_unit = display_unit(name, factor, float(point.stiffness.value[0]))
     dynamic, loss = band_at(point.stiffness, 0, to_unit), band_at(point.loss_factor, 0)
@@ -63,7 +63,7 @@ def headline_texts(result: Result, point: Prediction) -> dict[str, str]:
     row = {
         "place": str(place),
         "frequency": f"{number(frequency, 3)} Hz",
-        "amplitude": format_range(length, to_length * amplitude),
+        "amplitude": length.text(amplitude),
         "conditions": ", ".join(conditions),
         "stiffness": f"{format_aligned(dynamic[:1], 4)[0]} {unit}",
         "stiffness_band": format_interval(dynamic),
@@ -118,7 +118,7 @@ def value_rows(predictions: Sequence[Prediction]) -> Iterator[list[str]]:
     """
     frequencies = min(max(_ROWS // max(_AMPLITUDES * len(predictions), 1), 1), _FREQUENCIES)
     for prediction in predictions:
-        (length, to_length), _, (unit, factor) = prediction.direction.display
+        length, _, (unit, factor) = prediction.direction.display
         for index in spread_points(prediction.amplitude, prediction.frequency, _AMPLITUDES, frequencies):
             stiffness, loss = band_at(prediction.stiffness, index, factor), band_at(prediction.loss_factor, index)
             angles = [math.degrees(math.atan(end)) for end in loss]
@@ -126,7 +126,7 @@ def value_rows(predictions: Sequence[Prediction]) -> Iterator[list[str]]:
             yield [
                 str(prediction.direction),
                 f"{number(float(prediction.frequency[index]), 4)} Hz",
-                format_range(length, to_length * float(prediction.amplitude[index])),
+                length.text(float(prediction.amplitude[index])),
                 f"{format_aligned(stiffness[:1], 4)[0]} {unit}",
                 format_interval(stiffness),
                 f"{format_aligned(angles[:1], 3)[0]}°",

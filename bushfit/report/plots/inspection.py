@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec, SubplotSpec
 
-from bushfit.geometry import TRANSLATION
+from bushfit.geometry import TRANSLATION, Unit
 from bushfit.inspection.record import Inspection
 from bushfit.reading.measurement import Loop, Sweep, loss_factor
 from bushfit.reduction.resonance import LARGEST_ERROR, Resonance
@@ -19,7 +19,7 @@ from bushfit.report.plots.measured import header_of
 from bushfit.report.plots.pairs import ResponsePair
 from bushfit.report.plots.response import extreme_rows
 from bushfit.report.tables import shorten
-from bushfit.units import display_unit, format_range
+from bushfit.units import display_unit
 
 #: Colour of a history.
 _COLOR = "#3b528b"
@@ -97,7 +97,7 @@ def _draw_sweep(panels: Sequence[Axes], sweep: Sweep) -> Axes:
     """Draw stiffness and loss factor over the stepped quantity of a sweep; return the left panel."""
     place, length = sweep.direction, sweep.direction.display.displacement
     by_amplitude = sweep.stepped == "amplitude"
-    fixed_quantity, unit, scale = ("frequency", "Hz", 1.0) if by_amplitude else ("amplitude", *length)
+    fixed_quantity, unit = ("frequency", Unit("Hz", 1.0)) if by_amplitude else ("amplitude", length)
     x = sweep.step * (length.factor if by_amplitude else 1.0)
     x_label = header_of(place, "amplitude" if by_amplitude else "frequency")
     pair = ResponsePair(panels, place, float(np.abs(sweep.stiffness).max()), x_label, x)
@@ -108,8 +108,7 @@ def _draw_sweep(panels: Sequence[Axes], sweep: Sweep) -> Axes:
         pair.plot(means.index.to_numpy(), means.to_numpy(), color=look.color, ls=look.dashes, lw=0.8)
         pair.plot(x[at_level], sweep.stiffness[at_level], look.marker, color=look.color, alpha=0.75, **style.POINT)
     if sweep.stepped:
-        names = [format_range(unit, scale * level) for level in levels]
-        style.name_levels(panels[-1], names, fixed_quantity)
+        style.name_levels(panels[-1], list(map(unit.text, levels)), fixed_quantity)
     return panels[0]
 
 
@@ -164,7 +163,6 @@ def _draw_points(figure: Figure, grid: GridSpec, reduction: Reduction, looks: di
         reduction: operating points of the histories.
         looks: colour and marker by nominal amplitude [m, rad or 1].
     """
-    unit, length = reduction.direction.display.displacement
     steps = pd.DataFrame([vars(step) for step in reduction.steps]).sort_values("frequency", kind="stable")
     x, panels = steps["frequency"].to_numpy(), [figure.add_subplot(grid[-2, column]) for column in (0, 1)]
     quality = [figure.add_subplot(grid[-1, column], sharex=panels[0]) for column in (0, 1)]
@@ -189,7 +187,7 @@ def _draw_points(figure: Figure, grid: GridSpec, reduction: Reduction, looks: di
         style.label_axes(axes, "frequency [Hz]", label, x)
         axes.set_ylim(bottom=0.0)
     handles = [look.handle(True) for look in looks.values()]
-    style.legend(panels[-1], handles, [format_range(unit, length * level) for level in looks], "amplitude")
+    style.legend(panels[-1], handles, list(map(reduction.direction.display.displacement.text, looks)), "amplitude")
 
 
 @style.fixed_settings()

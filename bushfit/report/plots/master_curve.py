@@ -8,7 +8,7 @@ from bushfit.fitting.master_curve import ShiftedSweep
 from bushfit.model.model import Model
 from bushfit.report.plots import style
 from bushfit.report.plots.pairs import ResponsePair
-from bushfit.units import CELSIUS, number
+from bushfit.units import CELSIUS
 
 #: Number of points of a line.
 _FINE = 200
@@ -39,8 +39,7 @@ def master_curve_figure(model: Model, shifted_sweeps: Sequence[ShiftedSweep], ti
         reached = np.sort(np.concatenate([shifted.sweep.amplitude for shifted in of_place]))
         near = np.searchsorted(reached, _NEAR * reached) - np.arange(reached.size)
         level = float(np.median(reached[near.argmax() :][: near.max()]))  # the level with most points
-        length_unit, length = place.display.displacement
-        levels.append(f"{place} {number(level * length, 3)} {length_unit}")
+        levels.append(f"{place} {place.display.displacement.text(level)}")
         reach = np.concatenate([shifted.reduced_frequency for shifted in of_place])
         largest = max(float(np.abs(shifted.reduced_stiffness).max()) for shifted in of_place)
         pair = ResponsePair(panels, place, largest, "reduced frequency f a_T [Hz]")

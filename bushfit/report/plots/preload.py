@@ -55,8 +55,7 @@ def preload_figure(result: Result, predictions: Sequence[Prediction], title: str
                 mask = (prediction.frequency == frequency) & (prediction.amplitude == amplitudes[index])
                 x = np.array([preload.in_display_unit(place)[0]])
                 pair.plot(x, prediction.measured[mask], color=look.color, marker=look.marker)
-    unit, to_people = place.display.displacement
-    style.name_levels(panels[-1], [format_range(unit, to_people * level) for level in amplitudes], "amplitude")
+    style.name_levels(panels[-1], list(map(place.display.displacement.text, amplitudes)), "amplitude")
     sentence = f"Lines: model at {format_range('Hz', frequency)}; shaded: its 95 % band."
     measured = any(prediction.measured is not None for prediction in predictions)
     return figure.explain(sentence, *["Points: measured."] * measured)
