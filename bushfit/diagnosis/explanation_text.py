@@ -149,8 +149,10 @@ def format_amount(name: str, result: Result) -> str:
     amount, parameter = effect.amount, qualified_name(effect, effect.amount)
     value, interval = result.model.values[parameter], result.interval(parameter)
     unit, factor = display_unit(amount.unit, 1.0, value)
-    value_text, *ends = format_aligned([factor * x for x in (value, *(interval or ()))], 3)
     quantity, _, _ = (amount.meaning or amount.name).partition(" (")
+    if value < 0.0 and amount.opposite:
+        quantity, factor, interval = amount.opposite, -factor, interval and interval[::-1]
+    value_text, *ends = format_aligned([factor * x for x in (value, *(interval or ()))], 3)
     text = f"{quantity}: {f'{value_text} {unit}'.removesuffix(' -').removesuffix(' 1')}"
     if end := amount.reached_bound(value):
         return f"{text} (at its {end}imum)"

@@ -91,6 +91,7 @@ class Parameter:
         typical: usual distance from the neutral value, by which a fit scales the parameter.
         meaning: description for users.
         log: True if a fit varies the logarithm of the (positive) parameter.
+        opposite: description of minus the value, if users understand it better where the value is negative.
         scale: quantity of the tests that determines the start value in a search: "period", "frequency", "displacement",
             "strain" or "force"; "session" for a share of the session's duration; "order" for the order of a
             derivative; None if `typical` suits all tests.
@@ -103,6 +104,7 @@ class Parameter:
     typical: float
     meaning: str
     log: bool = False
+    opposite: str = ""
     scale: Literal["period", "frequency", "displacement", "strain", "force", "order", "session"] | None = None
 
     def value_at_share(self, share: float) -> float:
