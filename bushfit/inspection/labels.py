@@ -12,13 +12,13 @@ import numpy as np
 from bushfit.caveat import Caveat
 from bushfit.geometry import Place
 from bushfit.reading.headers import HINTS, ZERO_TO_PEAK, AmplitudeConvention, plain
-from bushfit.reading.levels import read_condition
+from bushfit.reading.levels import ONE_TEST, read_condition
 from bushfit.reading.names import Labels, StatedQuantity, labels_in_names
 from bushfit.reading.roles import UNIT_NAMES
 from bushfit.reading.si_columns import columns_key
 from bushfit.reading.table import Table
 from bushfit.reading.times import sampling_rate_above
-from bushfit.units import common_unit, is_compatible, is_unit, parse_quantity, si_factor
+from bushfit.units import common_unit, is_compatible, is_unit, parse_quantity, parse_temperature, si_factor
 
 #: Conditions of a test that a campaign states, with their names in sentences.
 _CONDITIONS = {key: key for key in ("temperature", "preload", "date", "operator")} | {"specimen_number": "specimen"}
@@ -77,7 +77,7 @@ def keys_from_labels(
         and False if a label states an amplitude but not whether the amplitude is zero-to-peak or peak-to-peak.
 
     Raises:
-        MeasurementError: a sweep without an amplitude or a frequency.
+        MeasurementError: a sweep without an amplitude or a frequency, or two temperatures.
     """
     written = "from the lines above the table" if table.layout.header_line else "from the properties in the file"
     sources = {"from the name": by_name, written: table.labels_above, "from the other sheets": of_book}
@@ -106,10 +106,15 @@ def keys_from_labels(
             facts.setdefault(origin, []).append(f"amplitudes {labels.convention}")
             break
     for key, name in _CONDITIONS.items():
-        texts = ((origin, text) for origin, labels in sources.items() if (text := getattr(labels, key)))
-        origin, text = next(texts, ("", ""))
+        texts = {origin: text for origin, labels in sources.items() if (text := getattr(labels, key))}
+        origin, text = next(iter(texts.items()), ("", ""))
         is_static = key != "preload" or origin == written or "force_amplitude" not in table.roles
         if text and key not in test_options and is_static and (key != "temperature" or key not in table.roles):
+            if key == "temperature" and np.ptp([parse_temperature(one) for one in texts.values()]) > ONE_TEST:
+                found = " and ".join(f"{one} {where}" for where, one in texts.items())
+                hint = " or ".join(f'temperature = "{one}"' for one in texts.values())
+                problem, hint = "two temperatures are stated for this test", f"state the right one: {hint}"
+                raise table.header_error(problem, found=found, expected="one temperature", hint=hint)
             keys[key] = text
             facts.setdefault(origin, []).append(f"{name} {text}")
     return keys, {origin: ", ".join(sentences) for origin, sentences in facts.items()}, has_convention

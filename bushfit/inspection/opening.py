@@ -221,7 +221,7 @@ def describe_columns(table: Table, *, is_sweep: bool) -> tuple[ColumnDescription
     for key, (index, _) in table.row_labels.items():
         columns[index] = ColumnDescription(table.headers[index], key.replace("_", " "), None)
     for role, column in table.roles.items():
-        is_read = role in values and column.subtracted is None
+        is_read = role in values and not column.terms
         ends = (float(values[role].min()), float(values[role].max())) if is_read else (None, None)
         for index in column.indices:
             columns[index] = ColumnDescription(table.headers[index], column.role.replace("_", " "), column.unit, *ends)

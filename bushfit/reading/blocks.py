@@ -16,6 +16,7 @@ from bushfit.reading.layout import Layout
 from bushfit.reading.lines import WITH_UNIT, Line, is_comment, is_row, is_summary_row, is_units_row, split
 from bushfit.reading.names import NO_LABELS, labels_above, named_quantities
 from bushfit.reading.numerals import common_decimal, is_like_number, plainest_value
+from bushfit.reading.rejected import begins_other_table
 from bushfit.reading.roles import UNIT_NAMES, is_test
 from bushfit.reading.source import Channels, RowSource, Sheet, Text, cells_of
 
@@ -268,7 +269,8 @@ def _stacked_blocks(source: RowSource, layout: Layout, vocabulary: Vocabulary) -
         labels = between
         if blocks[-1].rows:  # below rows, a mean or a header with other names is no label, but a row to be left out
             labels = [line for line in between if not is_left_out(line)]
-        begins = bool(rows) and (len(between) < len(above) or labels_above(labels) != NO_LABELS)
+        is_stated = labels_above(labels) != NO_LABELS and not any(begins_other_table(texts(line)) for line in labels)
+        begins = bool(rows) and (len(between) < len(above) or is_stated)
         left_out = [line for line in between if not (is_note(line) or (begins and line in labels))]
         blocks[-1].rows.extend(left_out)
         if begins and blocks[-1].rows:

@@ -69,7 +69,7 @@ def classify(
     roles: dict[str, Column] = {}
     extremes: dict[tuple[str, Extreme], Column] = {}
     rejected: set[str] = set()
-    role_by_index = _stated_indices(table, vocabulary, columns)
+    role_by_index, terms = _stated_indices(table, vocabulary, columns)
     vague = {n for n, header in enumerate(table.headers) if plain_name(header) == "k" or header in "fF"}
     for index, header in sorted(enumerate(table.headers), key=lambda column: column[0] in vague):  # after K* and freq
         heading = vocabulary.heading(header, table.layout.units[index]) if header else None
@@ -84,6 +84,7 @@ def classify(
         if is_empty and all(row[index] == "" for row in table.first_rows) and table.labels_above.sampling:
             continue  # the X_Value of LabVIEW, whose step is stated above
         role, column = heading.role, column_of(table, heading, index, stated_units.get(heading.role))
+        column = replace(column, terms=tuple((term, 1.0) for term in terms.get(index, ())))
         if heading.extreme:
             extremes.setdefault((role, heading.extreme), column)
         elif role not in roles:
@@ -176,8 +177,10 @@ def _require_plain_names(table: Table, roles: Mapping[str, Column]) -> None:
         raise table.header_error(**ERRORS["numbered_columns"], found=", ".join(table.headers), hint=hint)
 
 
-def _stated_indices(table: Table, vocabulary: Vocabulary, columns: Mapping[str, str]) -> dict[int, str]:
-    """Find the columns that the user states by their number; stated headers are only checked.
+def _stated_indices(
+    table: Table, vocabulary: Vocabulary, columns: Mapping[str, str]
+) -> tuple[dict[int, str], dict[int, list[int]]]:
+    """Find the columns that the user states by their number, or as a sum "A + B"; other headers are only checked.
 
     Args:
         table: header and rows of the table.
@@ -185,13 +188,13 @@ def _stated_indices(table: Table, vocabulary: Vocabulary, columns: Mapping[str, 
         columns: header or number of a column as the user states it, by role.
 
     Returns:
-        Role, such as "force", by index of the column.
+        Role, such as "force", by index of the column; and the indices of columns that are added to it, by its index.
 
     Raises:
         NoColumnError: a stated header or number that the file does not have.
-        MeasurementError: one header for two roles.
+        MeasurementError: one header for two roles, or a sum of columns in different units.
     """
-    indices, role_by_text = dict[int, str](), dict[str, str]()
+    indices, role_by_text, terms = dict[int, str](), dict[str, str](), dict[int, list[int]]()
     named_roles = vocabulary.roles([header for header in table.headers if header])
     for role, text in columns.items():
         if (first_role := role_by_text.setdefault(plain(text), role)) != role:
@@ -203,6 +206,13 @@ def _stated_indices(table: Table, vocabulary: Vocabulary, columns: Mapping[str, 
             )
     for role, text in columns.items():
         number = int(text) if text.isdecimal() and len(text) < 5 else 0
+        parts = text.split(" + ")
+        if len(parts) > 1 and set(parts) <= set(table.headers) and role not in named_roles:
+            first, *further = map(table.headers.index, parts)
+            number, terms[first] = first + 1, further
+            written = {(split_unit(table.headers[n])[1], table.layout.units[n]) for n in (first, *further)}
+            if len(written) > 1:
+                raise table.header_error("columns in different units cannot be added", found=text, expected="one unit")
         if 1 <= number <= len(table.headers):
             indices[number - 1] = role
         elif role not in named_roles:
@@ -212,7 +222,7 @@ def _stated_indices(table: Table, vocabulary: Vocabulary, columns: Mapping[str, 
             expected = f"the header that was stated for the {role.replace('_', ' ')}, or its number"
             hint = f'{advice} columns = {{ {role} = "{near or "..."}" }} in the campaign'
             raise table.header_error(problem, kind=NoColumnError, expected=expected, hint=hint)
-    return indices
+    return indices, terms
 
 
 def _preferred_column(table: Table, first: Column, second: Column) -> Column:

@@ -5,6 +5,7 @@ from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
+from bushfit.caveat import Caveat
 from bushfit.errors import BushfitError, MeasurementError, error_location
 from bushfit.geometry import TRANSLATION, Direction, Motion
 from bushfit.reading.blocks import combine_blocks
@@ -67,7 +68,8 @@ def find_table(
         with suppress(BushfitError):  # the parts together are no test either
             together = find_table(opened.join_sheets(), names, columns, stated_units, motion=motion, rows=rows)
             if is_test(set(together.roles)):
-                return together
+                note = Caveat("joined_sheets", HINTS["joined_sheets"])
+                return replace(together, notes=(*together.notes, note))
     if len(layouts) != 1:
         raise opened.part_error([source for source, _ in layouts])
     table = Table(opened, *layouts[0], names, motion)

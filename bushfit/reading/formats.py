@@ -88,13 +88,36 @@ def read_json(data: bytes, _: Path) -> Iterator[Group]:
 def _from_json(node: Any) -> Any:
     """Convert a value of a JSON file to the form that scipy returns for MATLAB: dicts, lists of dicts, and arrays."""
     if isinstance(node, dict):
-        return {name: _from_json(value) for name, value in node.items()}
+        fields = {name: _from_json(value) for name, value in node.items()}
+        return {
+            name: _named_channel(name, value) if isinstance(value, dict) else value for name, value in fields.items()
+        }
     if not isinstance(node, list) or not all(isinstance(one, dict) for one in node):
         return np.array(node) if isinstance(node, list) else node
     if any(isinstance(value, list) for one in node for value in one.values()):
         return [_from_json(one) for one in node]
-    names = dict.fromkeys(name for one in node for name in one)  # a row for each object
-    return {name: np.array([one.get(name, np.nan) for one in node]) for name in names}
+    rows = list(map(_flat, node))
+    names = dict.fromkeys(name for one in rows for name in one)  # a row for each object
+    return {name: np.array([one.get(name, np.nan) for one in rows]) for name in names}
+
+
+def _named_channel(name: str, fields: dict[str, Any]) -> dict[str, Any]:
+    """Form of a channel that an object with a unit and one list stands for; other objects are unchanged."""
+    arrays = [value for value in fields.values() if isinstance(value, np.ndarray)]
+    return (
+        {"Data": arrays[0], "Name": name, "Unit": fields["unit"]} if len(arrays) == 1 and "unit" in fields else fields
+    )
+
+
+def _flat(row: dict[str, Any]) -> dict[str, Any]:
+    """Object of a row whose values are no objects: {"K": {"value": 600, "unit": "N/mm"}} becomes {"K [N/mm]": 600}."""
+    flat = dict[str, Any]()
+    for name, value in row.items():
+        if isinstance(value, dict) and {*value} == {"value", "unit"}:
+            flat[f"{name} [{value['unit']}]"] = value["value"]
+        else:
+            flat |= _flat(value) if isinstance(value, dict) else {name: value}
+    return flat
 
 
 def _refuse_too_many(values: int) -> None:

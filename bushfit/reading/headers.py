@@ -160,18 +160,18 @@ class Column(Heading):
         header: text of the header cell.
         index: position of the column, from 0.
         scale: factor from the unit to SI.
-        subtracted: position of a column to be subtracted from this one, as minima from maxima; None without one.
+        terms: positions of columns that are added to this one, each with its sign: -1 for minima beside maxima.
     """
 
     header: str
     index: int
     scale: float = 1.0
-    subtracted: int | None = None
+    terms: tuple[tuple[int, float], ...] = ()
 
     @property
     def indices(self) -> tuple[int, ...]:
-        """Indices of the columns from which its values are computed: one, or two for a difference."""
-        return (self.index,) if self.subtracted is None else (self.index, self.subtracted)
+        """Indices of the columns from which its values are computed: one, or more for a sum or difference."""
+        return (self.index, *(index for index, _ in self.terms))
 
 
 class Vocabulary:

@@ -128,7 +128,7 @@ def add_half_differences(
             high, known = known, None
         if low is None or high is None or known or low.unit != high.unit:
             continue
-        roles[role] = replace(high, subtracted=low.index, convention="peak-to-peak")
+        roles[role] = replace(high, terms=((low.index, -1.0),), convention="peak-to-peak")
         numbers = first_numbers(table, (high, low))
         mean, half = float(numbers.mean()), float(np.abs(numbers[:, 0] - numbers[:, 1]).mean()) / 2.0
         note = f'half of "{high.header}" minus "{low.header}" is read as the {role.replace("_", " ")}'

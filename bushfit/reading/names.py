@@ -57,6 +57,11 @@ _SPECIMEN_NUMBER = re.compile(
     r"(?=P\d{2,4}(?![^\W_])))(P?\d[A-Za-z0-9]*)(?![^\W_]|[.,]\d)",
     re.IGNORECASE,
 )
+#: Duration of a treatment, whose temperature is not that of the test: "168 h", "24 Std", "7 days".
+_DURATION = re.compile(
+    r"(?<![\w.,])\d+(?:[.,]\d+)?[\s_]?(?:h|hrs?|hours?|std|stunden|days?|tage|weeks?|heures?|jours?)(?![^\W_])",
+    re.IGNORECASE,
+)
 #: Range of test temperatures [degC]; chosen: a number with a C outside this range is part of a part number.
 _TEMPERATURES = (-100.0, 300.0)
 #: Key of a campaign by each of its usual names above a table.
@@ -199,7 +204,7 @@ def _labels_in_name(name: str) -> Labels:
             values.setdefault("preload", text)
         elif unit == "degC":
             is_sure = len(match["unit"]) > 1 or (match["unit"] == "C" and re.match(r"[1-9]\d|\d\D", match["number"]))
-            is_plain = bool(is_sure) and not is_joined
+            is_plain = bool(is_sure) and not is_joined and not _DURATION.search(rest.replace("_", " "))
             if (is_plain or word in _WORDS["temperature"]) and _TEMPERATURES[0] < value < _TEMPERATURES[1]:
                 values.setdefault("temperature", text)
         elif unit in ("N", "kN"):

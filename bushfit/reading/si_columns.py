@@ -147,7 +147,8 @@ def columns_key(table: Table, role: str, unit: str) -> str:
     fitting, volts = [] if unit == "1" else fitting, volts if role in LOOP_COLUMNS else []
     key = " or ".join(f'columns = {{ {role} = "{header}" }}' for header in (fitting or volts)[:3] or ["..."])
     if role == "force" and len(fitting) == 2:
-        return f"{key} if this cell carries the load alone, or write the sum into a column if both share the load"
+        both = f'columns = {{ force = "{" + ".join(fitting)}" }}'
+        return f"{key} if this cell carries the load alone, or {both} if both share the load"
     if fitting or volts:
         return key if fitting else f'{key}, and the size of one volt: units = {{ {role} = "... {example}" }}'
     is_named = any(with_unit.heading(header) for header, _ in unused)

@@ -280,12 +280,12 @@ class Table:
                 table is in doubt.
         """
         table, left_out, requested = self.needing(wanted), list[FaultyRow](), wanted
-        subtracted = {
-            f"{role} subtracted": replace(column, index=column.subtracted)
+        terms = {
+            f"{role}|{index}": replace(column, index=index, scale=sign * column.scale)
             for role, column in wanted.items()
-            if column.subtracted is not None
+            for index, sign in column.terms
         }
-        wanted = {**wanted, **subtracted}
+        wanted = {**wanted, **terms}
         parts = [part for chunk in table.chunks() for part in table._read_chunk(chunk, wanted, left_out)]
         if left_out:
             refuse_other_columns(table, left_out, Vocabulary(names_for_motion(self.names, self.motion)))
@@ -304,8 +304,8 @@ class Table:
             if column.logarithm:
                 with np.errstate(over="ignore"):
                     values[role] = column.scale * column.logarithm ** (values[role] / column.scale)
-        for role in subtracted:
-            values[role.removesuffix(" subtracted")] -= values.pop(role)
+        for role in terms:
+            values[role.partition("|")[0]] += values.pop(role)
         return values, notes
 
     def needing(self, wanted: Mapping[str, Column]) -> "Table":
