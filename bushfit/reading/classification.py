@@ -210,7 +210,7 @@ def _stated_indices(
         if len(parts) > 1 and set(parts) <= set(table.headers) and role not in named_roles:
             first, *further = map(table.headers.index, parts)
             number, terms[first] = first + 1, further
-            written = {(split_unit(table.headers[n])[1], table.layout.units[n]) for n in (first, *further)}
+            written = {table.layout.units[n] or split_unit(table.headers[n])[1] for n in (first, *further)}
             if len(written) > 1:
                 raise table.header_error("columns in different units cannot be added", found=text, expected="one unit")
         if 1 <= number <= len(table.headers):
