@@ -143,7 +143,11 @@ def within_reach(model: Model, data_sets: Sequence[MeasuredTest]) -> Bounds:
         for parameter in effect.parameters
         if parameter.scale
     }
-    return {name: (float(values.min()), float(values.max())) for name, values in tried.items() if np.ptp(values) > 0.0}
+    return {
+        name: (float(values.min()), float(values.max()))
+        for name, values in tried.items()
+        if not np.allclose(values, values[0], atol=0.0)
+    }
 
 
 def result_of(
