@@ -260,7 +260,7 @@ class SearchState:
         moves = self.has_influence
         slopes, count = bare.coordinates.slopes(values)[moves], np.count_nonzero(moves)
         names = tuple(np.array(bare.names)[moves].tolist())
-        mean, covariance = linear.posterior_parameters(fast_relaxation(bare)[0][0])
+        mean, covariance = linear.posterior_parameters(fast_relaxation(bare))
         steps = dict(zip(names, slopes * mean[:count], strict=True))
         means = {name: float(np.clip(values[name] + x, *get_parameter(name).bounds)) for name, x in steps.items()}
         fitted = Covariance(names, covariance[:count, :count] * np.outer(slopes, slopes))

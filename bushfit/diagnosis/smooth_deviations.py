@@ -5,8 +5,6 @@ parameters exactly. The deviation of the compound is the same function in every 
 errors of a rig differ between them. So the deviation is part of every hypothesis, with the sizes and weights of
 `priors.COMPOUND`, and no effect is named for a gap that it explains. Where a compound deviates, the one strain that
 stands for the uneven field of a direction is inexact too, and so is the stiffness of a direction for a modulus of 1.
-Its relaxation does not end with the tested frequencies either: what relaxes faster than the tests bends the loss at the
-highest ones within a factor of e, which no smooth process of `COMPOUND_LENGTHS` does and a delay imitates.
 """
 
 from collections import defaultdict
@@ -26,6 +24,7 @@ from bushfit.fitting.preparation import (
     MeasuredSweep,
     MeasuredTest,
     group_repeats,
+    residual_slices,
     split_by_kind,
 )
 from bushfit.fitting.problem import FitResult
@@ -80,8 +79,9 @@ def compound_signature(fit: FitResult, count: int = _COMPOUND_PATTERNS) -> Signa
     """
     if not fit.data_sets:
         return None
-    smooth = _smooth_changes(fit, fit.data_sets, COMPOUND_LENGTHS, count=count, correlate=_compound_correlation)
-    columns, changes = map(np.concatenate, zip(smooth, _formula_changes(fit), fast_relaxation(fit), strict=True))
+    limits = {"count": count, "correlate": _compound_correlation}
+    columns, changes = _smooth_changes(fit, fit.data_sets, COMPOUND_LENGTHS, **limits)
+    columns, changes = map(np.concatenate, zip((columns, changes), _formula_changes(fit), strict=True))
     for loops in group_repeats(split_by_kind(fit.data_sets)[0]):
         columns = np.concatenate((columns, _repeat_changes(fit, loops, compound_shapes)))
     unit = np.zeros((len(columns), changes.shape[-1]), dtype=complex)
@@ -114,26 +114,24 @@ def _formula_changes(fit: FitResult) -> tuple[Array, Array]:
     return columns, np.concatenate(changes, axis=-1)
 
 
-def fast_relaxation(fit: FitResult) -> tuple[Array, Array]:
-    """Changes of residuals and stiffness due to a relaxation of the rubber compound that is faster than the tests.
+def fast_relaxation(fit: FitResult) -> Array:
+    """Changes of the whitened residuals due to a relaxation of the rubber compound that is faster than the tests.
 
     Far below its own frequency, a relaxation is a loss modulus proportional to frequency, as the phase of a delay is.
     The changes are those for a loss modulus that equals the median modulus |K|/(stiffness per modulus) of the tests at
     their highest frequency.
 
     Returns:
-        Changes of the n whitened residuals, (1, n), and relative changes of the stiffness at all operating points,
-        (1, points).
+        Changes, (n,); zero in the rows of priors, which follow those of the tests.
     """
-    model, tests = fit.model, fit.data_sets
-    factors = [stiffness_per_modulus(model.bushing, test.direction) for test in tests]
+    tests = fit.data_sets
+    highest = max(float(test.frequency.max()) for test in tests)
+    factors = [stiffness_per_modulus(fit.model.bushing, test.direction) for test in tests]
     modulus = np.median(np.concatenate([np.abs(test.measured) / k for test, k in zip(tests, factors, strict=True)]))
-    changes = [
-        1j * modulus * k * t.frequency / model.stiffness(t.direction, t.frequency, t.amplitude, kind=t.kind)
-        for t, k in zip(tests, factors, strict=True)
-    ]
-    change = np.concatenate(changes)[None] / max(float(test.frequency.max()) for test in tests)
-    return _residual_changes(fit, tests, change), change
+    changes = np.zeros(fit.residual.size)
+    for test, factor, rows in zip(tests, factors, residual_slices(tests), strict=True):
+        changes[rows] = test.residual_change(1j * modulus * factor * test.frequency / highest, fit.model)
+    return changes
 
 
 def _compound_correlation(points: Array, nodes: Array) -> Array:

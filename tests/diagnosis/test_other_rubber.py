@@ -104,7 +104,7 @@ def coverage(diagnosis, bushing):
 @pytest.mark.parametrize(
     ("rig", "amount", "truth", "sharpest"),
     [
-        (lambda k, omega: k * np.exp(-1e-4j * omega), "delay.tau", 1e-4, 0.6),
+        (lambda k, omega: k * np.exp(-6e-5j * omega), "delay.tau", 6e-5, 0.6),
         (lambda k, omega: k - 0.12 * omega**2, "inertia.mass", 0.12, 0.1),
     ],
     ids=["delay", "mass"],
