@@ -68,8 +68,8 @@ def find_table(
         with suppress(BushfitError):  # the parts together are no test either
             together = find_table(opened.join_sheets(), names, columns, stated_units, motion=motion, rows=rows)
             if is_test(set(together.roles)):
-                note = Caveat("joined_sheets", HINTS["joined_sheets"])
-                return replace(together, notes=(*together.notes, note))
+                sentence = "the sheets of this workbook are read together, because each has a part of the test"
+                return replace(together, notes=(*together.notes, Caveat("joined_sheets", sentence)))
     if len(layouts) != 1:
         raise opened.part_error([source for source, _ in layouts])
     table = Table(opened, *layouts[0], names, motion)

@@ -12,6 +12,8 @@ from rigged import LEVELS
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.condense import shorten_tests
+from bushfit.diagnosis.explanation_text import format_amount
+from bushfit.diagnosis.fits import within_reach
 from bushfit.diagnosis.workflow import diagnose
 from bushfit.effects import BASE
 from bushfit.effects.contract import Array
@@ -93,6 +95,19 @@ def test_a_hidden_lag_is_named_in_a_long_sweep_and_the_means_are_told():
     assert any("narrow bands" in note for note in map(str, found.notes))
     low, high = found.result.interval("delay.tau") or (0.0, 0.0)
     assert low < 2e-4 < high
+    words = format_amount("delay", found.result)
+    opposite = {"delay.tau": -found.result.model.values["delay.tau"]}
+    late = replace(found.result, model=found.result.model.with_values(opposite))
+    assert words.startswith("delay of the force: ")
+    assert format_amount("delay", late) == words.replace("force", "displacement")
+
+
+def test_a_shape_whose_start_values_differ_by_rounding_alone_has_no_reach(bare):
+    model = bare.model.with_values({"eps_half": 1e-6}).with_effect("second_friction")
+    reach = within_reach(model, bare.data_sets)
+    assert "second_friction.eps_half" not in reach
+    assert "second_friction.eps_half" in within_reach(bare.model.with_effect("second_friction"), bare.data_sets)
+    assert all(low < high for low, high in reach.values())
 
 
 @pytest.mark.parametrize(("most", "kept"), [(6.0, "012345"), (5.0, "01235"), (4.1, "0125"), (3.2, "015"), (0.1, "05")])
