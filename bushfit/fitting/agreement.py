@@ -22,14 +22,15 @@ from bushfit.model.result import ExpectedError, Misfit, PriorUse
 from bushfit.reading.measurement import loss_factor
 from bushfit.units import number
 
-#: Largest growth of a parameter's variance when a part of the rows is held out: beyond it the other rows do not
-#: determine the parameter, and the part is not predicted.
-_MOST_GROWTH = 100.0
+#: Largest factor by which the variance of a parameter may grow if rows are held out. If it grows more, the other rows
+#: do not determine the parameter, and the held-out rows are not predicted.
+_LARGEST_GROWTH = 100.0
 #: Singular value of the Jacobian, relative to the largest, below which it is rounding error.
 _LEAST_SEEN = 1e-7
-#: Longest Gauss-Newton step of a parameter, in coordinates, that predicts a refit: chosen, a third of its value.
+#: Longest Gauss-Newton step of a parameter, in its coordinate (mostly ln value), that predicts a refit; chosen: about a
+#: third of the value.
 _LONGEST_STEP = 0.3
-#: Share of the points whose error is below the expected error: chosen, as of all intervals.
+#: Share of the points whose error is below the expected error: 95 %, as for all intervals.
 _SHARE = 0.95
 #: Smallest share of the points of a direction that must be predicted for the expected error to use these alone.
 _ENOUGH = 0.5
@@ -72,7 +73,7 @@ class LeaveOut:
         """Mask of the parameters, (k,), whose variance grows 100-fold if `rows` (indices or mask) are left out."""
         size, vectors = np.linalg.eigh(self._information(rows))
         without = np.square(self.coordinate_steps @ vectors) @ (1.0 / np.maximum(size, _LEAST_SEEN**2))
-        return without > _MOST_GROWTH * np.sum(np.square(self.coordinate_steps), axis=1)
+        return without > _LARGEST_GROWTH * np.sum(np.square(self.coordinate_steps), axis=1)
 
     def parameter_step(self, rows: Array) -> Array | None:
         """Change of the k fitted parameters in their coordinates, (k,), if `rows` (indices or mask) are left out.
@@ -106,10 +107,9 @@ class LeaveOut:
         Returns:
             Derivatives, (n,).
         """
-        through = self.basis @ np.linalg.solve(self._information(rows), self.basis[rows].T @ predicted)
-        pull = -through
-        pull[rows] = predicted
-        return pull
+        gradient = -(self.basis @ np.linalg.solve(self._information(rows), self.basis[rows].T @ predicted))
+        gradient[rows] = predicted
+        return gradient
 
     def _information(self, rows: Array) -> Array:
         """Fisher information of a fit without the rows `rows` (indices or mask), along the basis vectors, (m, m)."""

@@ -29,19 +29,20 @@ from bushfit.model.result import PreloadRange, Quality, Range
 from bushfit.reading.preload import distinct_preloads
 from bushfit.units import CELSIUS, format_range, number
 
-#: Distance of the reduced chi-square from 1 beyond which noise alone is no explanation, in standard deviations.
+#: Largest excess of the reduced chi-square over 1 that noise alone explains, in standard deviations.
 _LACK_OF_FIT = 5.0
-#: Standard error of a combination of parameters that the data leave open, in coordinates, which are of order one:
-#: beyond all bounds, and small enough to cancel where a quantity does not depend on the combination.
+#: Standard error, in coordinates of order one, of a combination of parameters that the data do not determine: beyond
+#: all bounds, but small enough to cancel in quantities that do not depend on the combination.
 _LARGEST_ERROR = 1e3
-#: Shear moduli of rubber [Pa], with room: from the softest gel of a mount to the hardest compound at small strain.
+#: Shear moduli of rubber [Pa], with a margin: from the softest gel of a mount to the hardest compound at small strain.
 _SOFTEST, _HARDEST = 5e4, 1e8
-#: Modulus of the fastest and smallest test over that of the slowest and largest, at most, for any rubber.
+#: Largest ratio of the moduli of two tests of one rubber, at high frequency and small strain and the reverse.
 _MOST_STIFFENING = 20.0
-#: [K] Range of temperatures that the tests of one fit may have; chosen: filled rubber softens by up to 1 % a kelvin,
-#: and a test chamber keeps its temperature within less.
+#: Largest temperature difference of the tests of one fit [K]; chosen: filled rubber softens by up to 1 % per kelvin,
+#: and a test chamber keeps its temperature constant within less.
 _ONE_TEMPERATURE = 3.0
-#: Strain amplitude that no filled rubber bears for long; chosen: tests reach a third, a wrong prefix is 1000 times.
+#: Strain amplitude that no filled rubber endures; chosen: tests reach a third of it, and a wrong prefix is a factor of
+#: 1000.
 _MOST_STRAIN = 3.0
 _CHECK = "check the units of displacement, force and stiffness, and the dimensions of what was tested"
 
@@ -69,8 +70,8 @@ def covariance(
         Let d be the errors of all parameters. Each stage solves J_s (J_s^T d_s + J_r^T d_r + noise) = 0 for its
         parameters s, while the remaining parameters r have the errors of other stages. With J_s^T = Q R this is Q^T J^T
         d = b, cov(b) = 1, which never squares the Jacobian. Stacked over the stages it is M d = b, so that cov(d) =
-        (M^-1 B) (M^-1 B)^T with cov(b) = B B^T. J has a row more for each parameter: a prior of the standard error
-        _LARGEST_ERROR, which a combination has that the data leave open, and which rounding does not change.
+        (M^-1 B) (M^-1 B)^T with cov(b) = B B^T. J has one more row per parameter, a weak prior with the standard error
+        _LARGEST_ERROR, so that combinations that the data do not determine get a finite error.
     """
     fixed, stages = fixed or Covariance(), [stage for stage in stages if stage.names]
     fixed = fixed.restricted([name for name in fixed.names if name not in model.tied])
@@ -82,10 +83,10 @@ def covariance(
     bases = []
     for stage in stages:
         equations = slice(begin, begin + len(stage.names))
-        slope = FitProblem(model, stage.tests, names).linearise(model)[1]
-        slope = np.concatenate((slope, np.eye(len(names))[:, equations] / _LARGEST_ERROR), axis=1)
-        basis = np.linalg.qr(slope[equations].T)[0]
-        system[equations] = basis.T @ slope.T
+        jacobian = FitProblem(model, stage.tests, names).linearise(model)[1]
+        jacobian = np.concatenate((jacobian, np.eye(len(names))[:, equations] / _LARGEST_ERROR), axis=1)
+        basis = np.linalg.qr(jacobian[equations].T)[0]
+        system[equations] = basis.T @ jacobian.T
         excess = np.ones(len(basis))  # 1 in the rows of priors
         blocks = list(zip(stage.tests, residual_slices(stage.tests), strict=True))
         if not smooth_error:
@@ -107,14 +108,14 @@ def covariance(
             if test.compliance_error and test.direction.motion is TRANSLATION:
                 stiffness = model.stiffness(test.direction, test.frequency, test.amplitude, kind=test.kind)
                 by_compliance += influence[:, rows] @ test.residual_change(test.compliance_error * stiffness**2, model)
-        if smooth_error:  # beside it the error of the noise is the least part
+        if smooth_error:  # uncertainty of the noise is negligible compared with this error
             by_error = smooth_error.project(influence) @ smooth_error.columns.T
             added = by_error @ by_error.T
             spread.append(added * np.sqrt(2.0 / smooth_error.freedom))
             matrix = matrix + added + sum(test.extra_covariance(influence[:, rows]) for test, rows in blocks)
             continue
         for test, rows in blocks:
-            if isinstance(test, MeasuredLoop) and not test.gain_weighs:  # which the weights do not count
+            if isinstance(test, MeasuredLoop) and not test.gain_weighs:  # its gain error is not in the weights
                 change = test.gain_error * (influence[:, rows] @ test.gain_and_offset()[0])
                 matrix = matrix + np.outer(change, change)
         for variance, (change, lost) in _changes_by_noise(blocks, influence, basis).items():
@@ -124,7 +125,7 @@ def covariance(
     for change, lost in by_noise.values():
         size = np.sqrt(np.diag(matrix))
         scale = np.outer(size, size) + np.finfo(float).tiny
-        values, vectors = np.linalg.eigh(lost / scale)  # what is below zero is rounding
+        values, vectors = np.linalg.eigh(lost / scale)  # negative eigenvalues are rounding errors
         matrix = matrix + 2.0 * (vectors * np.maximum(values, 0.0)) @ vectors.T * scale
         spread.append(change)
     mixing = np.vstack([np.eye(len(names)), model.constraints.slopes(model.values, names).T])
@@ -156,15 +157,15 @@ def _changes_by_noise(
     return {variance: (first, second - lost @ lost.T) for variance, (first, second, lost) in sums.items()}
 
 
-def linear_errors(slope: Array) -> Array:
+def linear_errors(jacobian: Array) -> Array:
     """Standard errors of k parameters in their dimensionless coordinates (mostly ln value), (k,).
 
     The noise is assumed to be known and the model to be correct; `covariance` makes neither assumption.
 
     Args:
-        slope: derivatives of the n whitened residuals with respect to the coordinates, (k, n).
+        jacobian: derivatives of the n whitened residuals with respect to the coordinates, (k, n).
     """
-    root = np.linalg.qr(np.concatenate((slope.T, np.eye(len(slope)) / _LARGEST_ERROR)))[1]
+    root = np.linalg.qr(np.concatenate((jacobian.T, np.eye(len(jacobian)) / _LARGEST_ERROR)))[1]
     return np.linalg.norm(np.linalg.inv(root), axis=1)
 
 
@@ -347,7 +348,7 @@ def mixed_condition_warnings(data_sets: Sequence[MeasuredTest]) -> Iterator[Cave
         A warning if the tests are of several specimens, and one if they were made under several preloads.
     """
     labels = {"specimen_number": "of specimens", "preload": "under preloads of"}
-    if preload_ranges(data_sets):  # a variable of the model, or without influence
+    if preload_ranges(data_sets):  # the fit decides on an influence of the preload
         del labels["preload"]
     for key, words in labels.items():
         by_value: dict[str, str] = {}

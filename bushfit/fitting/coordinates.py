@@ -20,7 +20,7 @@ Bounds = Mapping[str, tuple[float | None, float | None]]
 #: Smallest significant singular value of a Jacobian, or eigenvalue of a scaled information matrix, relative to the
 #: largest: smaller ones are rounding errors.
 ROUNDING = 1e-10
-#: Least size of a parameter, relative to its typical value, that a relative change is counted from.
+#: Smallest magnitude of a parameter, relative to its typical value, to which a change is related.
 _LEAST_SIZE = 0.05
 
 

@@ -24,29 +24,30 @@ from bushfit.fitting.coordinates import ROUNDING
 from bushfit.fitting.problem import FitProblem, FitResult
 from bushfit.model.model import Model
 
-#: Damping of the first step, relative to the curvature: next to none, the starts are good (usual for such methods).
+#: Damping of the first step, relative to the curvature; a usual value, small because start values are good.
 _FIRST_DAMPING = 1e-3
-#: Factor on the damping after a step that brought all it promised (Nielsen).
+#: Factor on the damping after a step that lowered chi-square as expected (Nielsen).
 _LEAST_DAMPING_RATIO = 1.0 / 3.0
 #: Factor on the damping after a step that failed; it doubles with each failure in a row (Nielsen).
 _FIRST_GROWTH = 2.0
-#: Longest step of a parameter's logarithm: further out no linear model is worth a trial.
+#: Longest step of a parameter's logarithm: the linearised model is useless for longer steps.
 _LONGEST_STEP = 2.0
-#: Least fall of chi-square with which a step is taken, relative to the fall expected (usual for such methods).
+#: Smallest fall of chi-square at which a step is accepted, relative to the expected fall; a usual value.
 _LEAST_GAIN_RATIO = 1e-4
-#: Cosine between a step and the last one, in units of noise, from which the step is bent along the valley: chosen.
-_SAME_WAY = 0.8
-#: Share of a step's length that its bend may have, both in units of noise; chosen: further on the way bends otherwise,
-#: and nearly all steps fail.
-_MOST_BENT = 0.2
-#: Largest number of model evaluations of a fit to its end (ten to forty are usual), and relative change of chi-square
-#: at which it ends: far below the effect of noise.
+#: Smallest cosine of the angle between a step and the last step, in units of noise, at which the step is corrected for
+#: the curvature; chosen.
+_SAME_DIRECTION = 0.8
+#: Largest length of the correction for curvature, relative to the length of the step, both in units of noise; chosen:
+#: nearly all steps with larger corrections fail.
+_LARGEST_CORRECTION = 0.2
+#: Largest number of model evaluations of one fit (ten to forty are usual), and relative fall of chi-square below which
+#: the fit has converged: far below the effect of noise.
 EVALUATIONS, TOLERANCE = 400, 1e-9
-#: Expected fall of chi-square below which a step is the last, by default: a tenth of a standard error, however large
-#: the misfit, because models are compared in units of noise.
+#: Expected fall of chi-square below which a fit has converged by default: a step of a tenth of a standard error. The
+#: limit does not depend on the misfit, because models are compared in units of noise.
 _LEAST_FALL = 0.01
-#: Least squared norm of a parameter's derivatives, in units of noise, with which it moves: the shape of an effect of
-#: no amount stays.
+#: Smallest squared norm of a parameter's derivatives, in units of noise, at which the parameter moves: the shape
+#: parameters of an effect whose amount is zero keep their values.
 _LEAST_SENSITIVITY = 1e-6
 
 
@@ -134,21 +135,21 @@ class Descent:
             step, expected = fit._step(damping)
             smallest_fall = _LEAST_FALL if fit.tolerance is None else fit.tolerance * fit.chi_square
             converged = 0.0 <= expected < smallest_fall
-            bend = fit._curvature_correction(step, damping)
-            # so far out between the bounds, or on a way that bends so much, that only caution leads down
-            while expected < 0.0 or fit._length(bend) > _MOST_BENT * fit._length(step):
+            correction = fit._curvature_correction(step, damping)
+            # bounds or a strong curvature make the linearised model useless for this step: take a shorter one
+            while expected < 0.0 or fit._length(correction) > _LARGEST_CORRECTION * fit._length(step):
                 damping *= 2.0
                 step, expected = fit._step(damping)
-                bend = fit._curvature_correction(step, damping)
-            point = np.clip(fit.point + step + bend, *fit._step_limits)
+                correction = fit._curvature_correction(step, damping)
+            point = np.clip(fit.point + step + correction, *fit._step_limits)
             has_failed, after_failure = fit.growth > _FIRST_GROWTH, (damping * fit.growth, 2.0 * fit.growth)
             state = fit.evaluations + 1, converged, *after_failure
             fit = Descent(fit.best, fit.point, fit.tolerance, *state, fit.last)
             try:
                 model = fit.best.model.with_values(problem.coordinates.values(point))
                 with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-                    # after a step that failed the residuals are computed alone first, and the last step is too short
-                    # for the derivatives to change
+                    # derivatives are computed later after a failed step, which may fail again, and never for the last
+                    # step, which is too short to change them
                     slopes: Array | None = None
                     if converged or has_failed:
                         reached = problem.residual(model)
@@ -159,7 +160,7 @@ class Descent:
                         continue
                     if slopes is None:
                         slopes = fit.best.jacobian if converged else problem.linearise(model)[1]
-            except ModelError:  # no response there
+            except ModelError:  # the model has no response at this point
                 continue
             if np.all(np.isfinite(slopes)):
                 change = point - fit.point
@@ -198,22 +199,22 @@ class Descent:
         Returns:
             Step of the k parameter coordinates, (k,), and the expected fall.
         """
-        curvature, slope = self._hessian_and_gradient
+        curvature, gradient = self._hessian_and_gradient
         size = np.diag(curvature)
         low, high = self._step_limits
         damped = curvature + np.diag(damping * size)
         lowest, highest = self.best.problem.limits
-        outward = ((self.point <= lowest) & (slope >= 0.0)) | ((self.point >= highest) & (slope <= 0.0))
-        free, step = (size > _LEAST_SENSITIVITY) & ~outward, np.zeros_like(slope)
+        outward = ((self.point <= lowest) & (gradient >= 0.0)) | ((self.point >= highest) & (gradient <= 0.0))
+        free, step = (size > _LEAST_SENSITIVITY) & ~outward, np.zeros_like(gradient)
         while free.any():
-            step[free] = -_solve(damped, slope + damped[:, ~free] @ step[~free], free)
+            step[free] = -_solve(damped, gradient + damped[:, ~free] @ step[~free], free)
             aim = self.point + step
             outside = free & ((aim < low) | (aim > high))
             if not outside.any():
                 break
             step[outside] = (np.clip(aim, low, high) - self.point)[outside]
             free &= ~outside
-        return step, float(-(2.0 * slope + curvature @ step) @ step)
+        return step, float(-(2.0 * gradient + curvature @ step) @ step)
 
     def _curvature_correction(self, step: Array, damping: float) -> Array:
         """Correction of a damped step for the curvature of the residuals (geodesic acceleration), (k,).
@@ -234,12 +235,12 @@ class Descent:
         curvature, _ = self._hessian_and_gradient
         size = np.diag(curvature)
         lengths = self._length(step), self._length(before)
-        if step @ (size * before) <= _SAME_WAY * lengths[0] * lengths[1]:
+        if step @ (size * before) <= _SAME_DIRECTION * lengths[0] * lengths[1]:
             return np.zeros_like(step)
-        free, bend = (size > _LEAST_SENSITIVITY) & (step != 0.0), np.zeros_like(step)
-        pull = self.best.jacobian @ second * (lengths[0] / lengths[1]) ** 2
-        bend[free] = -0.5 * _solve(curvature + np.diag(damping * size), pull, free)
-        return bend
+        free, correction = (size > _LEAST_SENSITIVITY) & (step != 0.0), np.zeros_like(step)
+        change = self.best.jacobian @ second * (lengths[0] / lengths[1]) ** 2
+        correction[free] = -0.5 * _solve(curvature + np.diag(damping * size), change, free)
+        return correction
 
     def _length(self, step: Array) -> float:
         """Length of a step, (k,): root sum square of the changes of all residuals by each parameter alone."""
@@ -261,17 +262,17 @@ def repeat_fit(fit: FitResult, model: Model) -> FitResult:
     return replace(weighed, outliers=fit.outliers, smooth_error=fit.smooth_error)
 
 
-def _solve(curvature: Array, pull: Array, free: Array) -> Array:
-    """Solve curvature @ step = pull for the free parameters; along numerically undetermined combinations the step is 0.
+def _solve(curvature: Array, right: Array, free: Array) -> Array:
+    """Solve curvature @ x = right for the free parameters; x is 0 along numerically undetermined combinations.
 
     Args:
         curvature: Gauss-Newton Hessian of chi-square/2 in the coordinates, (k, k).
-        pull: negative gradient of chi-square/2, (k,).
+        right: right-hand side, in units of the gradient of chi-square/2, (k,).
         free: mask of the f parameters that move, (k,).
 
     Returns:
-        Step of the free parameters, (f,).
+        Solution x for the free parameters, (f,).
     """
     scale = np.sqrt(np.diag(curvature)[free])
     scaled = curvature[np.ix_(free, free)] / np.outer(scale, scale)
-    return np.linalg.lstsq(scaled, pull[free] / scale, rcond=ROUNDING)[0] / scale
+    return np.linalg.lstsq(scaled, right[free] / scale, rcond=ROUNDING)[0] / scale

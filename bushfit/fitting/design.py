@@ -17,20 +17,21 @@ from bushfit.fitting.preparation import MeasuredTest, operating_conditions, spli
 from bushfit.fitting.problem import FitProblem, FitResult
 from bushfit.model.model import Model
 
-#: Values tried of a shape parameter (a time, a gap, a frequency), spread evenly in its logarithm.
+#: Number of start values of a shape parameter (a time, a gap, a frequency), spaced evenly in its logarithm.
 _PROBES = 5
-#: Least and largest order of a derivative that is tried: one far below and one far above that of filled rubber, 0.2.
+#: Smallest and largest start value of the order of a derivative: far below and far above that of filled rubber, 0.2.
 _ORDERS = (0.05, 0.9)
-#: Least and largest onset of a drift, as a share of the session: from its first points to what is even.
+#: Smallest and largest start value of the onset of a drift, relative to the duration of the session: from its first
+#: points to a drift that is linear in time.
 _SESSION = (0.01, 10.0)
-#: Factors, besides 1, on a start value of a shape parameter that has no scale in the tests; chosen: within the decade
-#: that the tests of a bushing span, and far enough apart to reach other local minima.
+#: Factors, in addition to 1, on the start value of a shape parameter that has no scale in the tests; chosen: within the
+#: decade that the tests of a bushing span, and far enough apart to reach other local minima.
 _FACTORS = (0.25, 4.0)
-#: Evaluations of the model in the first round of all starts.
+#: Number of model evaluations of each fit in the first round, with all start values.
 _FIRST = 12
-#: Starts that are fitted to their end.
+#: Number of these fits, those with the lowest chi-square, that are continued until they converge.
 _BEST = 2
-#: Smallest difference in chi-square of two distinct minima: a tenth of the change by one standard error.
+#: Smallest difference in chi-square between two distinct minima: a tenth of the change by one standard error.
 _LOWER = 0.1
 #: Largest number of model evaluations in one fit.
 _MOST = 200
@@ -52,13 +53,13 @@ def start_with_effects(
         The model with the values of these fits if they give a lower chi-square than its start values; else unchanged.
     """
     added = [get_effect(name) for name in model.effects if name not in plain.effects]
-    with suppress(FitError, ModelError):  # no response, or too few points; the fit then says what is wrong
+    with suppress(FitError, ModelError):  # no response, or too few points: the fit itself reports it
         direct = Descent.start(FitProblem.with_fixed(model, data_sets, fixed, bounds)).run(_MOST)
         problem = FitProblem.with_fixed(plain, data_sets, fixed, bounds)
         solution = Descent.start(problem, TOLERANCE).run(_MOST).solution
         for effect in added:
             solution = with_effect(solution, data_sets, effect, fixed, bounds)
-        if solution.chi_square <= direct.chi_square - _LOWER:  # alike: two of one law may change names
+        if solution.chi_square <= direct.chi_square - _LOWER:  # equal minima may exchange two effects of one law
             return model.with_values({name: solution.model.values[name] for name in model.values})
     return model
 
@@ -81,7 +82,7 @@ def with_effect(
     Raises:
         FitError: the response of the model is not finite at any start.
     """
-    # what has a neutral amount starts at a tenth of its typical one: at its neutral value a fit may not see its shape
+    # the amount starts at a tenth of its typical value: at its neutral value, shape parameters have no influence
     small_amount = {} if effect.replaces else {qualified_name(effect, effect.amount): effect.amount.value_at_share(0.1)}
     starts = [
         solution.model.with_effect(effect.name, small_amount | start)
@@ -127,7 +128,7 @@ def shape_start_values(data_sets: Sequence[MeasuredTest], model: Model, paramete
             low, high = 0.7 * frequencies.max(), 4.0 * frequencies.max()
         case "displacement":
             amplitudes = np.concatenate([data_set.amplitude for data_set in data_sets])
-            low, high = 0.8 * amplitudes.min(), 0.95 * amplitudes.max()  # every test passes the first, one the second
+            low, high = 0.8 * amplitudes.min(), 0.95 * amplitudes.max()  # exceeded by all tests, and by one
         case "strain":
             low = 0.03 * strains.min()
             high = max(0.5 * model.values.get("eps_half", strains.max()), low)
@@ -136,7 +137,7 @@ def shape_start_values(data_sets: Sequence[MeasuredTest], model: Model, paramete
             high = max((float(np.max(np.abs(sweep.measured) * sweep.amplitude)) for sweep in translations), default=1.0)
             low, high = 0.3 * high, 0.95 * high
         case "order":
-            low, high = _ORDERS  # steeper than the first, which without it lies between the two
+            low, high = _ORDERS  # steeper than alpha, which lies between the orders of both terms
             low = min(max(low, model.values.get("alpha", low)), high)
         case "session":
             low, high = _SESSION

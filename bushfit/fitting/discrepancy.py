@@ -26,14 +26,14 @@ from bushfit.model.covariance import Z95
 
 #: Candidate sizes, relative to |K|: from the repeatability of the best rigs to far beyond any acceptable fit.
 SIZES = np.geomspace(1e-3, 0.4, 25)
-#: Lengths of the deviation of a rubber from a few parameters: relaxation takes decades of frequency, and breakdown more
-#: than one of strain.
+#: Lengths of the deviation of a compound from a model of few parameters: relaxation extends over decades of frequency,
+#: and breakdown over more than one decade of strain.
 COMPOUND_LENGTHS = (8.0, 3.0)
 #: Candidate lengths, in ln frequency and in ln strain: from the distance of neighbouring points to `COMPOUND_LENGTHS`.
 OVER_FREQUENCY, OVER_STRAIN = (0.15, 0.4, 1.0, 3.0, 8.0), (0.4, 1.0, 3.0)
 #: Smallest likelihood, relative to the largest, of a process that enters the average; chosen for time.
 _COUNTS = 0.05
-#: Smallest number of degrees of freedom of a size: Student's t of fewer has no variance.
+#: Smallest number of degrees of freedom of a size: with fewer, Student's t has no variance.
 _MINIMUM_FREEDOM = 3.0
 
 #: Names of directions or specimens, in groups whose members share one relative error of the model.
@@ -238,7 +238,7 @@ class Discrepancy:
         mean = (-inverse @ columns @ self.tests.project(self.tests.solution.residual)) @ self.complex_shapes
         both = np.concatenate((columns, self.tests.project(rows)))
         information = both @ both.T
-        information[len(columns) :, len(columns) :] = rows @ rows.T  # loops tell more than by a change of stiffness
+        information[len(columns) :, len(columns) :] = rows @ rows.T  # the higher harmonics of loops add information
         information[np.diag_indices(len(columns))] += 1.0 / size**2
         scale = 1.0 / np.sqrt(np.maximum(np.diag(information), np.finfo(float).tiny))
         information_values, vectors = np.linalg.eigh(information * np.outer(scale, scale))

@@ -102,7 +102,7 @@ def undetermined_parameters(
     changes = np.abs(Coordinates.of_parameters(model, names).slopes(model.values) * relative_sizes(model, names))
     stderr = {name: covariance.stderr(name) or 0.0 for name in names}
     errors = {name: stderr[name] / float(change) for name, change in zip(names, changes, strict=True)}
-    # amounts of added effects, and those within noise of their neutral value
+    # neutral values of amounts of added effects, and the amounts that do not differ from them significantly
     neutral = {name: value for name in names if (value := model.parameters[name].neutral) is not None}
     idle = {name for name in neutral if "." in name and abs(model.values[name] - neutral[name]) < Z95 * stderr[name]}
     if zero := [name for group in groups for name in group if name in idle]:
@@ -131,7 +131,7 @@ def undetermined_parameters(
     if combinations:
         sentence = "combinations that the tests determine: " + "; ".join(combinations)
         lines.append(Caveat("known_combinations", sentence))
-    # what another test would tell beside an error of the model depends on what that error is
+    # `plan` assumes that the model is correct, so it is not recommended if the model misses the tests
     missed = any(data_set.model_error for data_set in data_sets)
     advice = Caveat("determined_by_plan", "bushfit plan chooses further tests that determine these parameters")
     return lines if missed else [*lines, advice]

@@ -8,14 +8,15 @@ import numpy as np
 from bushfit.effects.contract import Array
 from bushfit.fitting.preparation import MeasuredSweep, MeasuredTest, residual_slices, split_by_kind
 
-#: Relative change of the variances at which the scoring ends: far below their standard error.
+#: Relative change of the variances at which Fisher scoring has converged: far below their standard error.
 _SETTLED = 1e-3
-#: Smallest fall of -2 ln(likelihood) by level errors that is more than chance; chosen on 40 simulated campaigns: chance
-#: gave 3 at most on most of them, and an error of the size of a point's scatter gave 50.
+#: Decrease of -2 ln(likelihood) above which errors of levels are significant; chosen on 40 simulated campaigns: chance
+#: gave 3 at most in most of them, and an error as large as the scatter of a point gave 50.
 _MATTERS = 6.0
-#: The same fall if no run was repeated: the error shared by a run is a guess then, and easily improved.
+#: The same limit if no run was repeated: the errors shared by a run are then assumed, not measured.
 _MATTERS_UNREPEATED = 0.5
-#: Smallest share of a level's error, after projecting out the fitted parameters, from which the error is estimated.
+#: Smallest remaining share of a level's error, after the fitted parameters are projected out, that determines the
+#: error.
 _LEFT = 1e-6
 
 
@@ -57,7 +58,7 @@ def level_errors(
     for sweep, block in zip(data_sets, residual_slices(data_sets), strict=True):
         if isinstance(sweep, MeasuredSweep):
             units = level_error_columns(sweep)
-            before, kinds = sweep.noise.level, np.append(kinds, np.arange(len(units)) % 2)  # gain, phase, in turn
+            before, kinds = sweep.noise.level, np.append(kinds, np.arange(len(units)) % 2)  # 0 for gain, 1 for phase
             rows.append(np.zeros((len(units), size)))
             rows[-1][:, block] = units
     nothing = LevelErrors(before, 0, significant=False)
@@ -88,19 +89,19 @@ def level_errors(
         covariance = np.eye(components.size) + np.tensordot(added, parts, 1)
         solved = np.linalg.solve(covariance, parts)
         white = np.linalg.solve(covariance, components)
-        slope = 0.5 * (np.einsum("i,kij,j->k", white, parts, white) - np.trace(solved, axis1=1, axis2=2))
-        curvature = 0.5 * np.einsum("kij,lji->kl", solved, solved)
-        return slope, curvature, float(np.linalg.slogdet(covariance)[1] + components @ white)
+        gradient = 0.5 * (np.einsum("i,kij,j->k", white, parts, white) - np.trace(solved, axis1=1, axis2=2))
+        information = 0.5 * np.einsum("kij,lji->kl", solved, solved)
+        return gradient, information, float(np.linalg.slogdet(covariance)[1] + components @ white)
 
-    for _ in range(40):  # of Fisher scoring; chosen: more than it takes
-        slope, curvature, _ = likelihood(added)
-        step = slope / np.maximum(np.diag(curvature), np.finfo(float).tiny)
+    for _ in range(40):  # Fisher scoring; it converges in fewer iterations
+        gradient, information, _ = likelihood(added)
+        step = gradient / np.maximum(np.diag(information), np.finfo(float).tiny)
         clipped = np.clip(added + step, 0.0, most_added)
         if np.all(np.abs(clipped - added) <= _SETTLED * (added + 1.0 / scale)):
             break
         added = clipped
-    _, curvature, minimum = likelihood(added)
-    freedoms = (2.0 * np.diag(curvature) * np.square(added + 1.0 / scale))[added < most_added]
+    _, information, minimum = likelihood(added)
+    freedoms = (2.0 * np.diag(information) * np.square(added + 1.0 / scale))[added < most_added]
     if freedoms.min(initial=np.inf) < 1.0:
         return nothing
     measured = any(sweep.noise.freedom for sweep in split_by_kind(data_sets)[1])

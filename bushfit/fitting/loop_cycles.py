@@ -18,23 +18,24 @@ from bushfit.reduction.programme import ENOUGH_ROWS, THREE_CYCLES, omitted_rows_
 
 #: Share of a period up to which a break in the steady motion, or a part left out, is ignored.
 _BRIEF = 0.02
-#: Harmonics and rows by which a frequency is refined at most; chosen: what a triangle has beyond them shifts no phase.
+#: Largest numbers of harmonics and of rows that refine a frequency; chosen: higher harmonics of a triangle shift no
+#: phase.
 _MOST_HARMONICS, _ROWS_TO_REFINE = 15, 2000
-#: Step of Gauss-Newton relative to the frequency at which it has converged (rounding), and largest step (beyond which
-#: the motion is not linear in the frequency).
+#: Gauss-Newton step relative to the frequency: limit of convergence (rounding), and largest step (for longer steps the
+#: motion is not linear in the frequency).
 _SETTLED, _LARGEST_STEP = 1e-12, 0.05
-#: Distance between the ends of a record, as a share of its range, from which on it holds no whole cycle: more than
-#: any noise.
+#: Distance between first and last displacement of a record, relative to its range, above which the record contains no
+#: whole cycle: larger than any noise.
 _OPEN = 0.1
 #: Largest distance between the ends of a closed cycle, relative to the cycle or to its amplitude.
 _CLOSED = 0.04
-#: Cycles, counted by one stroke, from which on a record is no single closed one, and where the ends of the record meet
-#: all the same: standing still at an extreme they may, and a motion may take longer one way than the other.
+#: Number of cycles, estimated from the duration of one stroke, above which a record is more than a single cycle; the
+#: second limit is for records whose ends meet, where the two strokes may differ in duration or the motion may pause.
 _MORE_THAN_ONE, _MORE_THAN_ONE_THAT_MEETS = 1.01, 1.1
-#: Root mean square by which what comes after one cycle may differ from its start, relative to the amplitude, or in
-#: units of the scatter of neighbouring rows where that is more.
+#: Largest root mean square difference of the motion after one cycle from its start, relative to the amplitude, or in
+#: units of the scatter of neighbouring rows, whichever is larger.
 _REPEATS, _REPEATS_SCATTER = 0.02, 6.0
-#: Largest difference of the ratio of third to first harmonic from that of a sine or triangle, to name a motion so.
+#: Largest difference of the ratio of third to first harmonic from that of a sine or triangle for a motion of this form.
 _LIKE = 0.03
 #: Share of the amplitude beyond which rows are counted.
 _OUTER = 0.9
@@ -111,7 +112,7 @@ def _steady_part(loop: Loop, time: Array, motion: Array) -> tuple[Loop, str | No
     span = max(spans, key=lambda span: round(span.cycles))
     first, last = span.begin, span.end
     if first > time[0] and span.cycles > THREE_CYCLES:
-        first += span.period  # after a run-in the first cycle still remembers it
+        first += span.period  # the first cycle after a run-in is not yet steady
     gaps = [f"{gap:.3g} s" if gap > _BRIEF * period else "" for gap in (first - time[0], time[-1] - last)]
     if not any(gaps):
         return loop, None
@@ -293,7 +294,7 @@ def wrong_clock(loop: Loop, coefficients: Array) -> str | None:
     motion = loop.displacement
     half = np.ptp(motion) / 2.0
     outer = float(np.mean(np.abs(motion - motion.min() - half) > _OUTER * half))
-    # evenly in time a triangle has 10 % there, a sine 29 %
+    # of rows evenly spaced in time, 10 % are this far out for a triangle, and 29 % for a sine
     like, opposite = ("a sine", "a triangle") if outer > 0.2 else ("a triangle", "a sine")
     if waveform(coefficients) != opposite:
         return None

@@ -19,10 +19,10 @@ from bushfit.reduction.harmonics import as_complex, basis, least_squares, resolv
 
 #: Largest range of a mean cycle, relative to that of its record; chosen: the ends of a Fourier series overshoot less.
 _LARGEST_OVERSHOOT = 1.3
-#: Samples of one cycle where a series is drawn as a curve and the model answers; chosen: rows between two samples are
-#: interpolated linearly, which is then off by 5e-6 of the amplitude.
+#: Number of samples per cycle at which a Fourier series and the model are evaluated; chosen: linear interpolation
+#: between two samples then has an error of 5e-6 of the amplitude.
 GRID = 1024
-#: Rows of a loop that the harmonics are fitted to at most; longer ones are averaged into as many bins of phase.
+#: Largest number of rows to which harmonics are fitted; rows of longer loops are averaged in this number of phase bins.
 MOST_ROWS = 4 * GRID
 #: Rows of a loop up to which every row is compared with the harmonics; rows of a longer loop are compared only if the
 #: fitted rows have outliers, to save time.
@@ -33,12 +33,12 @@ _MOST_HARMONICS = 60
 SMOOTH_HARMONICS = 5
 #: Number of harmonics of one cycle that represent slow change from cycle to cycle: settling or drift, not noise.
 _SLOW_HARMONICS = 3
-#: Residual of a triangle over that of free harmonics up to which a motion counts as one.
+#: Largest residual of a triangle, relative to that of free harmonics, at which a motion is represented by a triangle.
 _TRIANGLE_RATIO = 1.02
-#: Share of the amplitude, over the number of harmonics, by which these may miss a corner of the motion.
+#: Largest misfit at a corner of the motion, in units of the amplitude divided by the number of harmonics.
 _CORNER = 0.5
-#: How far equations over a loop's motion may be from solved, relative to it: a ten-thousandth of the noise of the best
-#: rigs. Derivatives are resolved apart from that.
+#: Accuracy of solutions of equations over a loop's motion, relative to the motion: 1e-4 of the noise of the best rigs.
+#: Derivatives are more accurate.
 _ACCURACY = 1e-8
 
 

@@ -20,11 +20,12 @@ from bushfit.model.result import Outlier
 from bushfit.reading.measurement import Sweep
 from bushfit.units import number
 
-#: Points that a sentence lists one by one; chosen: more make it long.
+#: Largest number of pairs of rows that a sentence lists.
 _MOST_LISTED = 4
-#: Magnitudes per point up to which, and step from one to the next, relative, from which on they are rounded.
+#: Magnitudes are reported as rounded if there are at most this many distinct ones per point, with a median relative
+#: step of at least the second value.
 _FEW_SIZES, _COARSE = 0.4, 0.01
-#: Digits of ln|K| that tell magnitudes apart.
+#: Number of decimals of ln|K| at which two magnitudes are equal.
 _DIGITS = 9
 #: Conditions of the rubber that repeats of a point share: a model that depends on no others has one response for them.
 _SAME_IN_REPEATS = {"temperature", "preload"}
@@ -224,10 +225,10 @@ class MeasuredSweep(MeasuredBase):
         Returns:
             Stiffness minus measurement, complex (..., n): relative difference in |K| + i difference in phase [rad].
         """
-        with np.errstate(divide="ignore", invalid="ignore"):  # not finite where there is no stiffness: within free play
+        with np.errstate(divide="ignore", invalid="ignore"):  # the stiffness is zero within free play
             if self.residuals == "complex":
                 ratio = stiffness / self.measured
-                return np.log(np.abs(ratio)) + 1j * np.angle(ratio)  # in parts: five times as fast as a complex log
+                return np.log(np.abs(ratio)) + 1j * np.angle(ratio)  # five times as fast as a complex log
             gain = np.abs(stiffness / self.measured) - 1.0
             loss = stiffness.imag / stiffness.real - self.measured.imag / self.measured.real
             return gain + 1j * loss * self._phase_per_loss

@@ -52,22 +52,23 @@ from bushfit.gaussian_process import MAXIMUM_NODES, RestrictedLikelihood
 from bushfit.model.model import Model
 from bushfit.units import number
 
-#: Smallest and largest size of the process over the size of the independent model error: fitted parameters absorb a
-#: part of a smooth error.
+#: Smallest and largest size of the process relative to the size of the independent model error; above 1, because fitted
+#: parameters absorb a part of a smooth error.
 _SMOOTH_RATIO = (1.0, 3.0)
-#: Points of a sweep at most that a process is made of; chosen for time.
+#: Largest number of points of a sweep that represent a process; chosen for time.
 _ENOUGH = 600
-#: Points from which on ripples over frequency are looked for as well.
+#: Number of points above which short lengths in frequency (ripples) are also tried.
 _DENSE = 300
-#: Relative error and reduced chi-square up to which a model meets its tests, as in `diagnose` and in `batch`.
+#: Relative error and reduced chi-square up to which a model agrees with its tests, as in `diagnose` and `batch`.
 _SLIGHT_ERROR, BEYOND_NOISE = 0.01, 2.0
-#: Prior odds of something smooth that the model lacks, against nothing; as `diagnose` has them.
+#: Prior odds of a smooth error of the model against none, as in `diagnose`.
 _ODDS = 0.2
-#: Gain of the log likelihood by a process of middling lengths, up to which no others are tried; chosen: of clean
-#: campaigns three in four stay below. And its nodes: few, as it only decides that.
-_MIDDLING, _SHOWS, _FEW = (0.9, 2.0), 0.5, 16
-#: Rounds of size and parameters at most, and the relative change of the size at which both have settled: far below
-#: how well a size is known.
+#: Screening process: lengths in ln frequency and ln strain; increase of the log likelihood up to which no other process
+#: is tried (chosen: three in four campaigns without model error stay below); and number of nodes, few because it only
+#: decides whether to continue.
+_SCREENING_LENGTHS, _SCREENING_GAIN, _SCREENING_NODES = (0.9, 2.0), 0.5, 16
+#: Largest number of alternating estimates of size and parameters, and relative change of the size at which they have
+#: converged: far below the uncertainty of the size.
 _MAXIMUM_ROUNDS, _SETTLED = 12, 0.02
 
 
@@ -145,7 +146,7 @@ def with_model_error(
     if not (certain or _exceeds_noise(_with_rig_errors(plain_fit, rig)) or _is_smooth(plain_fit, rig)):
         return plain_fit, None
     closest, size = closest_fit(plain_fit, bounds)
-    if size >= SIZES[-1]:  # that is no error of a model, but another thing than it
+    if size >= SIZES[-1]:  # too large to be an error of this model
         return plain_fit, None
     with_levels = _with_unseen_level_errors(plain_fit.problem.tests, rig)
     tests = FittedTests(closest.reevaluate(closest.model, _thin_sweeps(with_levels, size)))
@@ -179,8 +180,8 @@ def closest_fit(plain_fit: FitResult, bounds: Bounds) -> tuple[FitResult, float]
     """
     tests, names, starts = plain_fit.problem.tests, plain_fit.names, [plain_fit.model]
     fixed = {name: value for name, value in plain_fit.model.values.items() if name not in names}
-    with suppress(FitError):  # tests that no rubber gives
-        # a second start, with the branches read off the tests: a fit bent by noise may have lost one for good
+    with suppress(FitError):  # start values beyond the bounds: moduli that no rubber has
+        # a second start from values estimated from the tests, because the fit may have reduced a branch to zero
         paper = Model.with_defaults(plain_fit.model.bushing, BASE, start_values(plain_fit.model.bushing, tests, fixed))
         of_effects = [paper.start_values_for(effect)[0] for effect in plain_fit.model.records]
         values = {**paper.values, **{name: value for start in of_effects for name, value in start.items()}}
@@ -191,7 +192,7 @@ def closest_fit(plain_fit: FitResult, bounds: Bounds) -> tuple[FitResult, float]
     for _ in range(_MAXIMUM_ROUNDS):
         weighted, ends = [test.with_model_error(size) for test in tests], list[FitResult]()
         for start in starts:
-            with suppress(FitError, ModelError):  # no response from values that were read off the tests
+            with suppress(FitError, ModelError):  # the model has no response at these start values
                 ends.append(Descent.start(FitProblem(start, weighted, names, bounds), TOLERANCE).run().solution)
         solution = min(ends, key=lambda end: end.chi_square)
         starts, before = [solution.model], size
@@ -216,7 +217,7 @@ def likeliest_model_error(model: Model, data_sets: Sequence[MeasuredTest], names
         The log likelihood is -(ln|S| + r^T P r + ln|J S^-1 J^T|)/2 with the covariance S of noise and model error, the
         Jacobian J, (k, n), the residuals r, and P = S^-1 - S^-1 J^T (J S^-1 J^T)^-1 J S^-1.
     """
-    from scipy.optimize import minimize_scalar  # slow to import, and only a model that misses its tests needs it
+    from scipy.optimize import minimize_scalar  # slow to import, and rarely needed
 
     problem = FitProblem(model, [test.with_independent_noise() for test in data_sets], names)
     rows = np.vstack(problem.linearise(model))
@@ -300,14 +301,14 @@ def _is_smooth(plain_fit: FitResult, rig: RigSettings) -> bool:
     """True if the misfit is more probable with a smooth error of the model than with errors of noise and rig alone."""
     tests = _with_rig_errors(plain_fit.reevaluate(plain_fit.model, _thin_sweeps(plain_fit.problem.tests)), rig)
     names = tuple(dict.fromkeys(tests.directions.tolist()))
-    compound = Discrepancy.over_tests(tests, (names,), COMPOUND_LENGTHS, _FEW)
-    # such an error is as probable before the tests as its absence
-    if compound.maximum[0] > _SHOWS and compound.likelihood.log_evidence(SIZES) > 0.0:
+    compound = Discrepancy.over_tests(tests, (names,), COMPOUND_LENGTHS, _SCREENING_NODES)
+    # the prior odds of an error with the lengths of the compound are 1
+    if compound.maximum[0] > _SCREENING_GAIN and compound.likelihood.log_evidence(SIZES) > 0.0:
         return True
-    quick = [Discrepancy.over_tests(tests, (names,), _MIDDLING, _FEW)]
+    quick = [Discrepancy.over_tests(tests, (names,), _SCREENING_LENGTHS, _SCREENING_NODES)]
     if tests.directions.size > _DENSE:
         quick.append(Discrepancy.over_tests(tests, (names,), (OVER_FREQUENCY[0], OVER_STRAIN[-1]), MAXIMUM_NODES))
-    if max(process.maximum[0] for process in quick) <= _SHOWS:
+    if max(process.maximum[0] for process in quick) <= _SCREENING_GAIN:
         return False
     evidence = [process.likelihood.log_evidence(SIZES) for process in candidate_processes(tests)]
     return float(np.logaddexp.reduce(evidence)) - np.log(len(evidence)) + np.log(_ODDS) >= 0.0

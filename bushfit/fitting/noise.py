@@ -29,18 +29,19 @@ from bushfit.reading.measurement import Sweep
 #: Degrees of freedom from which on repeats alone determine the errors shared by a run; chosen: those of three repeats
 #: at two levels; with fewer, 95 % intervals were too narrow.
 _ENOUGH = 4
-#: Probability by chance below which variances are taken to be unequal, or a scatter to grow along the stepped quantity.
+#: Significance level at which variances are unequal, or the scatter grows along the stepped quantity.
 _BY_CHANCE = 1e-3
-#: Degrees of freedom from which on a level may have a separate scatter, and phase a scatter different from gain: fewer
-#: determine it within a quarter only, and wrong weights cost a tenth of the accuracy.
-_OWN_SCATTER = 10
+#: Smallest number of degrees of freedom at which a level may have a separate scatter, and phase a scatter different
+#: from gain: fewer determine the scatter within a quarter only, and wrong weights cost a tenth of the accuracy.
+_SEPARATE_SCATTER = 10
 #: Largest exponent of the variance over the stepped quantity, far beyond those of rigs.
 _STEEPEST = 6.0
-#: Shared variance of an outlying pair of repeats over the median of all pairs: noise alone reaches it once in 500
-#: campaigns.
+#: Shared variance, relative to the median of all pairs, above which a pair of repeats is outlying: noise alone reaches
+#: it once in 500 campaigns.
 _OUTLYING_PAIR = 100.0
 
-#: Key of a level: name of the sweep, and held value of its runs (amplitude [m or rad], frequency [Hz] or run number).
+#: Key of a level: name of the sweep, and constant value of its runs (amplitude [m or rad], frequency [Hz] or run
+#: number).
 LevelKey = tuple[str, float]
 _ORIGINS = {
     "repeats": "from repeats",
@@ -131,7 +132,7 @@ def sweep_noise(sweeps: Sequence[Sweep], rig: RigSettings = UNSTATED) -> SweepNo
     if disturbed := disturbed_steps(levels.values()):
         levels = of_levels(disturbed)
     slopes, by_name = dict[str, tuple[float, float]](), {sweep.name: sweep for sweep in sweeps}
-    for stepped in {sweep.stepped for sweep in sweeps}:  # one law for all sweeps that step the same
+    for stepped in {sweep.stepped for sweep in sweeps}:  # one law for all sweeps with the same stepped quantity
         names = [name for name, sweep in by_name.items() if sweep.stepped == stepped]
         if slope := _scatter_growth([level for key, level in levels.items() if key[0] in names and level.steps.size]):
             slopes |= dict.fromkeys(names, slope)
@@ -154,7 +155,7 @@ def sweep_noise(sweeps: Sequence[Sweep], rig: RigSettings = UNSTATED) -> SweepNo
     }
     if repeated:
         freedom, excesses = max(round(sum(level.shared_freedom for level in repeated)), _ENOUGH), dict[str, Caveat]()
-        largest = np.maximum(largest_error(rig), largest_error(UNSTATED))  # [rig] states what repeats share
+        largest = np.maximum(largest_error(rig), largest_error(UNSTATED))  # [rig] states errors that repeats share
         for name in by_name:
             error = _shared_errors([level for key, level in levels.items() if key[0] == name], rig)
             if np.any(error > largest):
@@ -200,12 +201,12 @@ def _scatter_growth(levels: Sequence[LevelNoise]) -> tuple[float, float] | None:
 
     from scipy.optimize import minimize_scalar
 
-    def unlikely(exponent: float) -> float:
+    def negative_log_likelihood(exponent: float) -> float:
         """Negative log likelihood of the random errors if their variance grows with this power of the step."""
         parts = np.split(ratio * np.exp(-exponent * centred), np.cumsum([log.size for log in logs])[:-1])
         return sum(part.size * float(np.log(part.mean())) for part in parts)
 
-    exponent = float(minimize_scalar(unlikely, bounds=(-_STEEPEST, _STEEPEST), method="bounded").x)
+    exponent = float(minimize_scalar(negative_log_likelihood, bounds=(-_STEEPEST, _STEEPEST), method="bounded").x)
     return exponent / 2.0, float(np.exp(np.concatenate(logs).mean()))
 
 
@@ -225,22 +226,22 @@ def _pool_variances(
     """
     if not measured:
         return {key: one.variance for key, one in levels.items()}, round(min(one.freedom for one in levels.values()))
-    well_known = [level for level in measured if level.freedom >= _OWN_SCATTER]
+    well_known = [level for level in measured if level.freedom >= _SEPARATE_SCATTER]
     compared = sorted(well_known or measured, key=lambda level: -float(level.variance.sum()))
-    for i, level in enumerate(compared):  # a single outlier may set a level apart
+    for i, level in enumerate(compared):  # a single outlier may make variances unequal
         if level.without_largest and _unequal(compared):
             compared[i] = level.without_largest
     equal = not _unequal(compared)
-    few = [level for level in measured if well_known and level.freedom < _OWN_SCATTER]
+    few = [level for level in measured if well_known and level.freedom < _SEPARATE_SCATTER]
     counted = [*compared, *few] if equal else measured
     freedoms = [level.freedom for level in counted]
     pooled, freedom = np.average([level.variance for level in counted], axis=0, weights=freedoms), sum(freedoms)
     unequal = 2.0 * fdtrc(freedom, freedom, pooled.max() / max(pooled.min(), FLOOR**2)) < _BY_CHANCE
-    if freedom < _OWN_SCATTER and not unequal:
+    if freedom < _SEPARATE_SCATTER and not unequal:
         pooled = np.full(2, pooled.mean())
     if equal or not well_known:
         return dict.fromkeys(levels, pooled), round(freedom)
-    by_level = {key: level.variance if level.freedom >= _OWN_SCATTER else pooled for key, level in levels.items()}
+    by_level = {key: level.variance if level.freedom >= _SEPARATE_SCATTER else pooled for key, level in levels.items()}
     return by_level, round(min(level.freedom for level in well_known))
 
 

@@ -33,7 +33,7 @@ _LEAST_NOISE = 1e-4
 _GROSS = 0.3
 #: Largest share of all rows that gross outliers may have; more distant rows belong to the motion itself.
 _MOST_GROSS = 0.1
-#: Degrees of freedom of a noise that is as good as known.
+#: Degrees of freedom above which the noise is treated as known.
 _KNOWN = 1e6
 #: Difference of two repeats, relative to |K|, from which on they contradict each other: more than the noise of any rig.
 _UNLIKE = 0.1
@@ -231,7 +231,7 @@ def _difference_from_repeats(values: Array, point_index: Array) -> tuple[Array, 
         order = np.lexsort((part, point_index))
         size, start = counts[point_index[order]], (np.cumsum(counts) - counts)[point_index[order]]
         rank = np.arange(order.size) - start
-        # the two in the middle of the others, which step over the point itself
+        # indices of the two middle values of the other repeats, without the point itself
         low, high = (np.minimum(half + (half >= rank), size - 1) for half in ((size - 2) // 2, (size - 1) // 2))
         medians = np.empty_like(part)
         medians[order] = (part[order][start + np.maximum(low, 0)] + part[order][start + high]) / 2.0
@@ -254,7 +254,7 @@ def least_absolute(basis: Array, values: Array, smallest: float) -> Array:
         Least squares, reweighted by the reciprocal distances, by the normal equations.
     """
     weight = np.ones((len(values), 1))
-    for _ in range(25):  # chosen: nine of ten curves have then come within a third of the noise of where they end
+    for _ in range(25):  # chosen: nine of ten curves are then within a third of the noise of their limit
         weighted = (basis * weight).T
         solution = np.linalg.solve(weighted @ basis, weighted @ values)
         distance = np.sqrt(np.square(values - basis @ solution).sum(axis=1, keepdims=True))

@@ -36,7 +36,7 @@ PRELOAD = "preload"
 _ODD = ("preload.c2", "preload.friction", "preload.rate")
 #: Parameters of the influence that is the same for both senses of the preload.
 _EVEN = ("preload.c3", "preload.friction_square", "preload.rate_square")
-#: Probability of chance below which an influence is claimed; chosen: one campaign in a hundred without an influence.
+#: Largest p-value at which an influence is reported; chosen: one false report in a hundred campaigns.
 _CHANCE = 0.01
 #: 95 % quantile of chi-square with one degree of freedom.
 _CHI_SQUARE_95 = 3.84
@@ -130,7 +130,7 @@ def _probability_of_chance(data: PreparedCampaign, tests: Sequence[MeasuredTest]
     if errors.significant:
         tests = with_level_errors(tests, errors.error, errors.freedom)
         plain, full = _fit_both(data, replace(plain.problem, model=plain.model, tests=tests), fixed)
-    # the errors that a run shares are as uncertain as the repeats are few
+    # few repeats determine the errors that a run shares, so their degrees of freedom limit those of the test
     estimated = [sweep.noise.freedom for sweep in split_by_kind(tests)[1] if sweep.noise.freedom]
     added, freedom = len(full.names) - len(plain.names), min([full.residual.size - len(full.names), *estimated])
     variance = max(full.chi_square / (full.residual.size - len(full.names)), 1.0)

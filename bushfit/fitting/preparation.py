@@ -25,8 +25,8 @@ from bushfit.units import number
 
 __all__ = ["MeasuredLoop", "MeasuredSweep"]
 
-#: Relative difference of two loops' amplitudes, or frequencies, up to which one repeats the other; chosen: rigs come
-#: back to an amplitude within it.
+#: Largest relative difference of the amplitudes, or frequencies, of two loops that repeat each other; chosen: rigs
+#: return to an amplitude within it.
 SAME_LOOP = 0.02
 #: Step in temperature [K] up to which tests belong to the same temperature.
 _SAME_KELVIN = 1.0
@@ -125,7 +125,7 @@ def _with_contradictions(tests: Sequence[_Kind], conditions: Sequence[Array]) ->
     """
     if len(tests) < 2:
         return list(tests)
-    kelvin = np.nan_to_num(np.hstack([test.temperature for test in tests]))  # those that are not known are a group
+    kelvin = np.nan_to_num(np.hstack([test.temperature for test in tests]))  # unknown temperatures are one group
     order, session = np.argsort(kelvin), np.empty(kelvin.size, dtype=np.intp)
     session[order] = np.cumsum(np.diff(kelvin[order], prepend=kelvin[order[0]]) > _SAME_KELVIN)
     points = np.unique(np.stack([*conditions, session]), axis=1, return_inverse=True)[1]
@@ -133,7 +133,7 @@ def _with_contradictions(tests: Sequence[_Kind], conditions: Sequence[Array]) ->
     marked = list(tests)
     for separation, *pair in reversed(contradictions(np.concatenate([test.measured for test in tests]), points)):
         first, later = np.sort(owner[pair])
-        if first != later:  # a file that contradicts itself tells so
+        if first != later:  # contradictions within one test have their own warning
             difference = f"their stiffness differs by {number(100.0 * separation, 2)} %"
             contradiction = Caveat("test_repeat_differs", f"it repeats {tests[first].name}, and {difference}")
             marked[later] = replace(tests[later], contradiction=contradiction)

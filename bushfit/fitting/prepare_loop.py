@@ -31,27 +31,28 @@ from bushfit.reduction.harmonics import as_complex, basis, least_squares, series
 from bushfit.reduction.turning_points import reversals
 from bushfit.units import number
 
-#: Largest difference of the amplitude of the mean cycle from half the range of the record, relative to that half;
-#: chosen: noise and drift of a steady loop are smaller. Rows that are enough to find the range.
+#: Largest difference between the amplitude of the mean cycle and half the range of the record, relative to half the
+#: range (chosen: noise and drift of a steady loop are smaller); and number of rows that suffices to find the range.
 _UNEQUAL, _ENOUGH_ROWS = 0.15, 100_000
-#: Smallest covariance of displacement and force in a cycle, relative to the largest of the other sign, that is no noise
-#: or incomplete cycle; chosen: a force of opposite sign has nearly -1.
+#: Smallest covariance of displacement and force in a cycle, relative to the largest one of the opposite sign, that
+#: shows a reversed force; chosen: a reversed force gives nearly -1, noise or an incomplete cycle much less.
 _REVERSED = 0.5
-#: Root mean square difference of the displacement from its mean cycle, without noise and relative to the amplitude:
-#: from which on cycles are unequal, and from which on they are no loop, whose mean has then lost 4 % of its amplitude;
-#: chosen: rigs keep a motion within 1 %, and a drift adds some per cent.
+#: Root mean square difference of the displacement from its mean cycle, without noise and relative to the amplitude,
+#: above which cycles are unequal, and above which the record is not a loop (the mean cycle has then lost 4 % of the
+#: amplitude); chosen: rigs repeat a motion within 1 %, and a drift adds some per cent.
 _MISFIT, _NOT_PERIODIC = 0.05, 0.2
 #: Share of the amplitude, or of half the force's range, above which a mean is reported as a preload; chosen: zero
 #: errors of sensors are smaller.
-TOLD_MEAN = 0.05
+REPORTED_MEAN = 0.05
 #: Largest distance of the first displacement and force from rest, relative to half the range, for a start from rest.
 _AT_REST = 0.02
-#: Number of standard deviations beyond which a change of force, or energy that a loop releases, is not chance.
+#: Number of standard deviations above which a change of the force, or released energy, is not due to chance.
 _CERTAIN = 5.0
-#: Loss factor up to which a loop may give energy, for the delay of a rig.
+#: Largest negative loss factor (released energy) that is attributed to a delay of the rig.
 _NO_LOSS = 2e-3
-#: Share of half the force's range by which the mean force of a motion about zero may exceed its second harmonic before
-#: it is taken for a preload; chosen: wrong zeros of load cells are less, and an uneven stiffness makes both alike.
+#: Excess of the mean force over the second harmonic, relative to half the force range, above which a motion about zero
+#: is taken to be preloaded; chosen: zero errors of load cells are smaller, and an asymmetric stiffness gives a mean
+#: force of about the size of the second harmonic.
 _PRELOADED = 0.25
 
 
@@ -69,7 +70,7 @@ def prepare_loop(loop: Loop, *, without_outliers: bool = False) -> MeasuredLoop:
 
     Raises:
         FitError: the displacement is not one whole cycle or more of a periodic motion, rows are missing, or the loop
-            gives energy.
+            releases energy.
     """
     whole = loop
     loop, frequency, cycles, left_out = steady_cycles(whole)
@@ -120,7 +121,7 @@ def prepare_loop(loop: Loop, *, without_outliers: bool = False) -> MeasuredLoop:
     if from_rest and not rests[0]:
         prepared = replace(prepared, datum=float(np.average(prepared.measured_force, weights=prepared.weights)))
     elif not from_rest:
-        # a stiffness that is not the same to either side makes a mean force too, and a second harmonic of its size
+        # an asymmetric stiffness also causes a mean force, with a second harmonic of about the same size
         mean, _, cosine, _, sine = least_squares(basis(prepared.phase, 2), prepared.measured_force, prepared.weights)
         preload = float(mean) if abs(mean) - np.hypot(cosine, sine) > _PRELOADED * half_force else None
         unknown = prepared.has_predecessor or abs(found.motion[0]) > 0.01 * float(prepared.amplitude[0])
@@ -146,7 +147,7 @@ def _unequal_cycles(prepared: MeasuredLoop, scatter: float) -> list[Caveat]:
     rows = motion[:: -(-motion.size // _ENOUGH_ROWS)]
     recorded = float(np.ptp(np.quantile(rows, (0.01, 0.99)))) / 2.0
     misfit = 0.0
-    if scatter > _MISFIT * amplitude:  # which may be noise
+    if scatter > _MISFIT * amplitude:  # this scatter may be noise
         misfit = float(np.sqrt(max(scatter**2 - float(difference_noise(motion, 3)) ** 2, 0.0))) / amplitude
     if abs(amplitude / recorded - 1.0) <= _UNEQUAL and misfit <= _MISFIT:
         return []
@@ -168,11 +169,11 @@ def _unequal_cycles(prepared: MeasuredLoop, scatter: float) -> list[Caveat]:
 
 def _check_one_sign(loop: Loop, frequency: float) -> None:
     """Raise a FitError if the force rises with the displacement in some cycles and falls in others."""
-    turn = ((loop.time - loop.time[0]) * frequency).astype(np.intp)
-    covariance = np.bincount(turn, (loop.displacement - loop.displacement.mean()) * (loop.force - loop.force.mean()))
+    cycle = ((loop.time - loop.time[0]) * frequency).astype(np.intp)
+    covariance = np.bincount(cycle, (loop.displacement - loop.displacement.mean()) * (loop.force - loop.force.mean()))
     smaller, larger = sorted((float(covariance.min()), float(covariance.max())), key=abs)
     if smaller * larger < 0.0 and abs(smaller) > _REVERSED * abs(larger):
-        row = int(np.argmax(np.sign(covariance)[turn] != np.sign(covariance[0])))
+        row = int(np.argmax(np.sign(covariance)[cycle] != np.sign(covariance[0])))
         raise FitError(
             "the force changes its sign within the record",
             file=loop.source.file if loop.source else None,
@@ -209,11 +210,11 @@ def _with_row_noise(prepared: MeasuredLoop, loop_harmonics: LoopHarmonics) -> Me
         The loop with its noise; the rows of a long loop, which are bins of phase, may have other weights.
     """
     binned = prepared.measured_force.size < prepared.test.force.size
-    turn = prepared.phase.astype(np.intp)
+    cycle = prepared.phase.astype(np.intp)
     half_row = 0.5 * prepared.cycles / prepared.test.time.size
-    rows = (turn >= int(prepared.from_rest)) & (turn < int(prepared.cycles + half_row))
-    cycles = np.unique(turn[rows]).size
-    if not cycles or np.count_nonzero(rows) < 32 * cycles:  # fewer resolve no correlation
+    rows = (cycle >= int(prepared.from_rest)) & (cycle < int(prepared.cycles + half_row))
+    cycles = np.unique(cycle[rows]).size
+    if not cycles or np.count_nonzero(rows) < 32 * cycles:  # too few to resolve a correlation
         return prepared
     phase, force, weight = prepared.phase[rows], prepared.measured_force[rows], prepared.weights[rows]
     harmonics = loop_harmonics.force
@@ -229,15 +230,15 @@ def _with_row_noise(prepared: MeasuredLoop, loop_harmonics: LoopHarmonics) -> Me
     settled, scale = remove_slow_changes(phase, misfit)[0], np.sqrt(weight) if binned else 1.0
     model, size = row_noise(misfit * scale, settled * scale, cycles)
     if binned and model.order:
-        # a row more or less in a bin of rows that depend on one another tells nothing: one weight for each turn
+        # the number of correlated rows in a bin says little about its accuracy: one weight for all bins of a cycle
         weighted = prepared.weights > 0.0
-        count = np.bincount(turn[weighted], minlength=turn.max() + 1)
-        mean = np.bincount(turn[weighted], prepared.weights[weighted], minlength=count.size) / np.maximum(count, 1)
-        prepared = replace(prepared, weights=np.where(weighted, mean[turn], 0.0))
+        count = np.bincount(cycle[weighted], minlength=cycle.max() + 1)
+        mean = np.bincount(cycle[weighted], prepared.weights[weighted], minlength=count.size) / np.maximum(count, 1)
+        prepared = replace(prepared, weights=np.where(weighted, mean[cycle], 0.0))
         scale = np.sqrt(prepared.weights[rows])
         model, size = row_noise(misfit * scale, settled * scale, cycles)
     if binned:
-        breaks = () if prepared.from_rest else tuple((np.flatnonzero(np.diff(turn)) + 1).tolist())
+        breaks = () if prepared.from_rest else tuple((np.flatnonzero(np.diff(cycle)) + 1).tolist())
         model = replace(model, row_scale=max(size / loop_harmonics.force_noise, 1.0), breaks=breaks)
         return replace(prepared, row_noise=model)
     if not model.order:
@@ -250,13 +251,13 @@ def _at_reversal(prepared: MeasuredLoop) -> Array:
     """Mask of the rows within 1.5/1024 of a cycle of a turning point, where the force of dry friction jumps, (n,)."""
     motion, position = prepared.history(is_transient=False).value, prepared.phase * GRID
     if prepared.from_rest:
-        turns = np.flatnonzero(reversals(motion))
+        samples = np.flatnonzero(reversals(motion))
     else:
-        turns, position = np.flatnonzero(reversals(np.tile(motion, 3))) - GRID, position % GRID
-    turns = np.concatenate(([-np.inf], turns, [np.inf]))
-    after = np.searchsorted(turns, position)
-    # one step, and the half by which the point may lie beside its sample
-    return np.minimum(position - turns[after - 1], turns[after] - position) < 1.5
+        samples, position = np.flatnonzero(reversals(np.tile(motion, 3))) - GRID, position % GRID
+    samples = np.concatenate(([-np.inf], samples, [np.inf]))
+    after = np.searchsorted(samples, position)
+    # one step, and half a step because a turning point may be between two samples
+    return np.minimum(position - samples[after - 1], samples[after] - position) < 1.5
 
 
 def _starts_at_rest(loop: Loop, harmonics: LoopHarmonics, frequency: float) -> tuple[bool, bool]:
@@ -279,10 +280,10 @@ def _starts_at_rest(loop: Loop, harmonics: LoopHarmonics, frequency: float) -> t
     noise = loop.noise * half_force if loop.noise is not None else harmonics.force_noise
     end = np.searchsorted(loop.time, loop.time[0] + 2.0 / frequency)
     clock, force = loop.time[:end] - loop.time[0], loop.force[:end]
-    comparable = np.searchsorted(clock, clock[-1] - 1.0 / frequency, side="right")  # a cycle later
+    comparable = np.searchsorted(clock, clock[-1] - 1.0 / frequency, side="right")  # with a row one cycle later
     first = clock[: max(min(int(np.searchsorted(clock, 0.02 / frequency)), int(comparable)), 1)]
     change = abs(float(np.median(np.interp(first + 1.0 / frequency, clock, force) - force[: first.size])))
-    # of a difference, and of a median, whose standard error is sqrt(pi/2) of that of a mean
+    # sqrt(2) for the difference of two rows; the standard error of a median is sqrt(pi/2) = 1.25 times that of a mean
     chance = 1.25 * _CERTAIN * noise * np.sqrt(2.0 / first.size)
     if change <= max(chance, 5e-3 * half_force):
         return False, False
@@ -296,17 +297,17 @@ def _starts_at_rest(loop: Loop, harmonics: LoopHarmonics, frequency: float) -> t
 
 
 def recorded_means(prepared: MeasuredLoop) -> list[Preload]:
-    """Mean displacement and mean force of a loop, as far as they are too large for a zero error of a sensor.
+    """Mean displacement and mean force of a loop, each only if it is too large to be a zero error of a sensor.
 
     Returns:
-        Means [m, rad or 1, and N or N m] that are too large; none, one or both.
+        None, one or both of the means [m, rad or 1, and N or N m].
     """
     if prepared.datum is None:
         return []
     motion, means = prepared.test.direction.motion, list[Preload]()
-    if abs(mean_motion := float(prepared.coefficients[0].real)) > TOLD_MEAN * float(prepared.amplitude[0]):
+    if abs(mean_motion := float(prepared.coefficients[0].real)) > REPORTED_MEAN * float(prepared.amplitude[0]):
         means.append(Preload(mean_motion, motion.displacement_unit))
-    if abs(prepared.datum) > (TOLD_MEAN if means else _PRELOADED) * prepared.half_range:
+    if abs(prepared.datum) > (REPORTED_MEAN if means else _PRELOADED) * prepared.half_range:
         means.append(Preload(prepared.datum, motion.force_unit))
     return means
 

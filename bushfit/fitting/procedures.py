@@ -42,7 +42,7 @@ from bushfit.units import display_unit, number
 STATIC = ("mu", "sigma_fmax", "eps_half")
 DYNAMIC = ("m", "alpha")
 
-#: Passes of the two-step procedure agree when no parameter moves by more than this, relative.
+#: Relative change of each parameter from one pass of the two-step procedure to the next at which it has converged.
 _AGREED = 1e-5
 _MOST_PASSES = 50
 #: Least and largest factor by which an accelerated pass extrapolates the last change.
@@ -96,7 +96,7 @@ def fit_joint(
     if not preload_ranges(tests):
         effects = [name for name in effects if name != PRELOAD]
     unused = [test for test in data.data_sets if test not in tests]
-    # copies, so that what they compute for the fit is released with it
+    # copies of the tests, so that the values that they cache are released with the fit
     problem = data.problem(data.starting_model(effects, tests), [replace(test) for test in tests])
     found = solve_problem(problem, robust=data.robust)
 
@@ -166,7 +166,7 @@ def fixed_static_result(data: PreparedCampaign) -> Result | None:
     return Result(Model.with_defaults(data.campaign.bushing, ("elastic", "friction"), fixed))
 
 
-@lru_cache(maxsize=1)  # `run` asks for it, and so does what its static fit says of the springpot
+@lru_cache(maxsize=1)  # `run` needs the result, and so does the springpot warning of its static fit
 def fit_two_step(data: PreparedCampaign) -> TwoStep:
     """Alternate the static and the dynamic fit, each with the parameters of the other fixed, until they agree.
 
@@ -211,7 +211,7 @@ def fit_two_step(data: PreparedCampaign) -> TwoStep:
     )
 
 
-@lru_cache(maxsize=1)  # the static fit, and the first pass of the two steps
+@lru_cache(maxsize=1)  # needed by the static fit, and by the first pass of the two-step procedure
 def _fit_without_springpot(data: PreparedCampaign) -> FitResult:
     """Fit mu, sigma_fmax and eps_half to the loops by a model without the springpot."""
     return _fit_step(data, data.static_loops(), {})
@@ -220,7 +220,7 @@ def _fit_without_springpot(data: PreparedCampaign) -> FitResult:
 def _springpot_warning(data: PreparedCampaign, static: FitResult) -> Caveat:
     """Warning that states by how many per cent the static parameters changed because the springpot was left out."""
     values, two_step = static.model.values, None
-    with suppress(FitError):  # no sweep, or none that goes with the loops
+    with suppress(FitError):  # no sweep, or the passes do not converge
         two_step = fit_two_step(data).result
     if two_step and not two_step.at_bound:
         better, source = two_step.model.values, "With m and alpha from this campaign's sweep"
@@ -314,8 +314,9 @@ def build_result(
     model, tests = model or last.model, [test for step in steps for test in step.data_sets]
     names = tuple(name for step in steps for name in step.names)
     at_bound = {name: end for step in steps for name, end in step.at_bound.items()}
-    without_bounded = bounded_is_fixed or last.smooth_error  # beside an error, a parameter at a bound is fixed
-    stages = [step.stage(step.at_bound if without_bounded else ()) for step in steps]
+    # a parameter at a bound has no error of its own if a smooth error of the model is included
+    fixes_bounded = bounded_is_fixed or last.smooth_error
+    stages = [step.stage(step.at_bound if fixes_bounded else ()) for step in steps]
     cov = covariance(last.model, stages, fixed, last.smooth_error)
     priors = prior_uses(steps, fixed)
     warnings = [*notes, *prior_warnings(priors)]

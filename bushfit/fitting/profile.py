@@ -22,22 +22,22 @@ from bushfit.model.model import Model
 from bushfit.model.result import End
 from bushfit.progress import track
 
-#: Longest step of the search, in coordinates, which are of order one: one that the fit of the others follows.
+#: Longest step of the search, in coordinates of order one; the refit of the other parameters still converges quickly.
 _LONGEST_STEP = 0.5
-#: Step away from a bound where a parameter does next to nothing, so that the others have nothing to follow.
+#: Step away from a bound at which the parameter has almost no influence, so that the other parameters hardly change.
 _BLIND_STEP = 4.0 * _LONGEST_STEP
-#: First step of the search over the distance at which a parabola would end: the first step then passes most ends.
+#: First step of the search relative to half the interval of a parabola: most ends are within the first step.
 _FIRST_REACH = 1.1
-#: Largest number of steps of the search to either side: a side without end within a hundred factors e is open.
+#: Largest number of steps to each side: an interval without an end within a factor of e^100 is open.
 _MOST_STEPS = 200
-#: Accuracy of an end, in steps: far better than the three digits that are printed.
+#: Accuracy of an end, in steps: far better than the three printed digits.
 _PRECISION = 1e-4
-#: Noise that was itself estimated widens an interval by no more than this factor (Student's t of two degrees of
-#: freedom).
+#: Largest factor by which an estimated noise widens an interval (Student's t with two degrees of freedom).
 _WIDEST = 2.2
-#: Share of the allowed rise from which on bounds of other parameters, not the data, may determine an end: chosen.
+#: Expected fall of chi-square without the bounds of other parameters, relative to the allowed rise, above which these
+#: bounds, not the data, may determine an end; chosen.
 _HELD_BY_OTHERS = 0.1
-#: Distance of such an end from the best value, in coordinates, from which on that side is open: a factor e.
+#: Distance of such an end from the best value, in coordinates, above which the interval is open: a factor of e.
 _FAR = 1.0
 
 #: One-sided 95 % quantile of the normal distribution, in standard deviations.
@@ -86,7 +86,7 @@ def find_limit(
         if coordinate not in fits:
             others = [other for other in best.names if other != name]
             problem = replace(best.problem, model=model_at(coordinate), names=others)
-            # five to ten evaluations are the rule, and the tolerance is far below what the rise is compared with
+            # five to ten evaluations suffice, and the tolerance is far below the allowed rise
             fits[coordinate] = Descent.start(problem, 1e-7).run(100).solution
         return float(np.sqrt(max(fits[coordinate].chi_square - best.chi_square, 0.0))) - allowed
 
@@ -95,10 +95,10 @@ def find_limit(
         if root_rise(ahead) < 0.0:
             continue
         crossing = brentq(root_rise, current, ahead, xtol=_PRECISION * step)
-        root_rise(crossing)  # mostly known
+        root_rise(crossing)  # so that `fits` contains it
         found = fits[crossing]
         new_bounds = not set(found.at_bound) <= set(best.at_bound)
-        # by which chi-square would fall there if others could leave the bounds that they met on the way
+        # expected fall of chi-square at this end if other parameters could leave bounds that they reached on the way
         fall = found.expected_fall(best.at_bound) if new_bounds and abs(crossing - start) > _FAR else 0.0
         return None if fall > _HELD_BY_OTHERS * allowed**2 else model_at(crossing).values[name]
     return None
@@ -132,8 +132,8 @@ def profile95(best: FitResult, covariance: Covariance) -> Mapping[str, Interval]
         )
     start = best.coordinates.point(best.model.values)
     linear = linear_errors(best.jacobian)
-    half = np.array([covariance.half_widths.get(name, 0.0) for name in names])  # 0 of one at a bound
-    # how far a model error, or a gain of a loop that the weights do not contain, bends parameters, no weight tells
+    half = np.array([covariance.half_widths.get(name, 0.0) for name in names])  # 0 at a bound
+    # errors that are not in the weights of the fit, of the model or of gains of loops, widen intervals without a limit
     loops, _ = split_by_kind(best.problem.tests)
     missed = any(test.model_error for test in best.problem.tests) or not all(loop.gain_weighs for loop in loops)
     widest = np.inf if missed else _WIDEST * Z95 * np.sqrt(misfit_factor(best))

@@ -20,7 +20,7 @@ from bushfit.fitting.rig_class import ASSUMED
 from bushfit.reading.measurement import Sweep
 from bushfit.reduction.arrays import MEDIAN_TO_SIGMA, median
 
-#: Least noise of any rig, relative to the largest force or to |K|.
+#: Smallest noise of any rig, relative to the largest force or to |K|.
 FLOOR = 1e-4
 #: Degree, in the logarithm of the stepped quantity, of the smooth curve that replaces repeats; chosen: it follows
 #: stiffness over two decades.

@@ -24,16 +24,17 @@ from bushfit.fitting.solve import solve_with_lmfit
 from bushfit.model.model import Model
 from bushfit.model.result import Outlier
 
-#: Distance, in units of noise, around which soft_l1 turns from squares to distances; normal noise loses 4 % there.
+#: Distance, in units of noise, around which soft_l1 changes from squares to absolute values; it costs 4 % of efficiency
+#: under normal noise.
 _SOFT = 2.0
 #: Efficiency (E psi')^2/E psi^2 of soft_l1 under normal noise, by the number of residuals of a point: psi is the
 #: derivative of the loss by the distance of a point in units of noise, and E the mean over all distances.
 _EFFICIENCY = {1: 0.9768665463299635, 2: 0.9892965108936514}
-#: A reweighted fit has settled when it moves by less than this, in standard errors: far below what matters.
+#: Change of the parameters, in standard errors, below which reweighting has converged: far below their uncertainty.
 _SETTLED = 0.01
-#: Rounds of reweighting; chosen: most fits take five, what has not settled by then swings to and fro.
+#: Largest number of rounds of reweighting; chosen: most fits need five, and a fit that needs more oscillates.
 _MOST_ROUNDS = 30
-#: Rows of a test that a sentence names, to fit on a line or two.
+#: Largest number of rows of a test that a sentence lists.
 _MOST_NAMED = 8
 
 

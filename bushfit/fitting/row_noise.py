@@ -20,23 +20,24 @@ from scipy.linalg import solve_banded, toeplitz
 
 from bushfit.effects.contract import Array
 
-#: Orders of the autoregressive model that are tried; chosen: 1 is a plain filter, 8 a steep one with its corner.
+#: Candidate orders of the autoregressive model; chosen: 1 describes a first-order filter, 8 a steep one with its
+#: corner.
 _ORDERS = (0, 1, 2, 3, 4, 6, 8)
-#: Floor under the spectrum, over the noise's variance; chosen: without it the whitening of noise that a filter has
-#: taken away at high frequency would magnify what the model and its interpolation err there.
+#: Lower limit of the spectrum, relative to the variance of the noise; chosen. Without it, whitening would magnify
+#: errors of the model and of interpolation at high frequencies, where a filter has removed the noise.
 _FLOOR = 3e-4
-#: Fewest frequencies per coefficient of the model.
+#: Smallest number of frequencies per coefficient of the model.
 _FEWEST = 4
-#: Orders in a row that do not better the model, after which no higher one is tried.
-_IN_VAIN = 2
-#: Number of the lowest observed frequencies whose mean power is the first guess of the power below them.
+#: Number of successive orders without an improvement after which no higher order is tried.
+_PATIENCE = 2
+#: Number of the lowest observed frequencies whose mean power is the first estimate of the power below them.
 _LOWEST = 3
-#: Harmonics of one cycle up to which cycles may differ by settling or drift, and so not by noise alone.
+#: Harmonic of the cycle below which cycles may differ by settling or drift, in addition to noise.
 _SLOW = 3.5
-#: Largest power between these harmonics that is taken for noise, relative to the largest of a filter with one pole.
+#: Largest power between these harmonics that is treated as noise, relative to that of a first-order filter.
 _MOST_SLOW = 4.0
-#: First even harmonic of a single cycle that is taken for noise; chosen: a bushing that is equally stiff both ways has
-#: odd harmonics only, and an uneven one mainly adds the second.
+#: First even harmonic of a single cycle that is treated as noise; chosen: a symmetric bushing has odd harmonics only,
+#: and an asymmetric one mainly adds the second.
 _FIRST_EVEN = 4
 
 
@@ -166,9 +167,9 @@ def row_noise(residual: Array, settled: Array, cycles: int) -> tuple[RowNoise, f
     used, power = fast, _periodogram(settled)
     model = _fit_autoregression(power, waves, used)
     slow = between & ~fast
-    # a drift less its harmonics leaves a step per cycle
-    turn = np.arange(residual.size) * cycles // residual.size - (cycles - 1) / 2.0
-    whole = _periodogram(residual - turn * (turn @ residual) / max(turn @ turn, 1.0))
+    # a drift without its harmonics is a step per cycle
+    steps = np.arange(residual.size) * cycles // residual.size - (cycles - 1) / 2.0
+    whole = _periodogram(residual - steps * (steps @ residual) / max(steps @ steps, 1.0))
     first = int(np.argmax(fast))
     steepest = model.spectrum(waves[:, first : first + 1]) * np.square(first / np.maximum(number, 1))
     if slow.any() and np.mean(whole[slow] / steepest[slow]) < _MOST_SLOW:
@@ -191,7 +192,7 @@ def noise_harmonics_of_single_cycle(number: Array) -> Array:
 def _periodogram(rows: Array) -> Array:
     """Power of rows, (n,), at their n // 2 + 1 frequencies, in the squared unit of the rows, above rounding."""
     power = np.abs(np.fft.rfft(rows)) ** 2 / rows.size
-    return np.maximum(power, np.finfo(float).eps * power.mean())  # of cycles that repeat exactly, rounding
+    return np.maximum(power, np.finfo(float).eps * power.mean())  # above rounding, for cycles that repeat exactly
 
 
 def _fit_autoregression(power: Array, waves: Array, used: Array) -> _Autoregression:
@@ -208,9 +209,9 @@ def _fit_autoregression(power: Array, waves: Array, used: Array) -> _Autoregress
     lowest = int(used_numbers[0])
     filled = np.interp(np.arange(power.size), used_numbers, power[used_numbers])
     filled[:lowest] = power[used_numbers[:_LOWEST]].mean()
-    models, prices = [], []
+    models, criteria = [], []
     for order in (order for order in _ORDERS if order * _FEWEST <= used_numbers.size):
-        for _ in range(60):  # of filling in; nearly all take ten
+        for _ in range(60):  # iterations for the unobserved power; ten suffice for nearly all loops
             correlations = cosines[: order + 1] @ filled
             correlations[0] *= 1.0 + _FLOOR
             predictor = -np.linalg.solve(toeplitz(correlations[:-1]), correlations[1:])
@@ -221,7 +222,7 @@ def _fit_autoregression(power: Array, waves: Array, used: Array) -> _Autoregress
                 break
         spectrum = model.spectrum(waves)[used]
         models.append(model)
-        prices.append(2.0 * np.sum(np.log(spectrum) + power[used] / spectrum) + order * np.log(spectrum.size))
-        if len(prices) > _IN_VAIN and min(prices[-_IN_VAIN:]) > min(prices):
+        criteria.append(2.0 * np.sum(np.log(spectrum) + power[used] / spectrum) + order * np.log(spectrum.size))
+        if len(criteria) > _PATIENCE and min(criteria[-_PATIENCE:]) > min(criteria):
             break
-    return models[int(np.argmin(prices))]
+    return models[int(np.argmin(criteria))]

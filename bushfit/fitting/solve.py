@@ -38,14 +38,14 @@ def solve_with_lmfit(problem: FitProblem) -> FitResult:
     free = lmfit.Parameters()
     free.add_many(*((f"u{i}", value) for i, value in enumerate(problem.start.tolist())))
 
-    @lru_cache(maxsize=2)  # tests know again the model they answered last: the best so far, and the one tried
+    @lru_cache(maxsize=2)  # the best model and the current trial; tests cache the response of the last model object
     def model_at(*point: float) -> Model:
         """Model at a point of the fit, given by the coordinates of its free parameters."""
         if not np.all((low <= point) & (point <= high)):
             raise ModelError("a step of the fit leaves the bounds")
         return problem.model.with_values(problem.coordinates.values(point))
 
-    # a residual that is not finite is a ValueError of lmfit, which takes roots of a covariance nobody asked for
+    # lmfit raises a ValueError if a residual is not finite; it also takes roots of its covariance, which is not used
     with suppress(ModelError, ValueError), np.errstate(invalid="ignore", divide="ignore"):
         fit = lmfit.minimize(
             lambda parameters: problem.residual(model_at(*parameters.valuesdict().values())),

@@ -16,20 +16,20 @@ from bushfit.fitting.assess import implausible_modulus
 from bushfit.fitting.preparation import MeasuredTest, operating_conditions
 from bushfit.geometry import Bushing, stiffness_per_modulus
 
-#: Strain amplitude of the largest test over eps_half, before anything is known; chosen: the fit finds the rest.
+#: Assumed ratio of the largest strain amplitude to eps_half for the start value of eps_half; chosen.
 _SCALED_STRAIN = 3.0
 #: Smallest share of a modulus, or of a loss, that the start values assign to a branch.
 _LEAST_SHARE = 0.1
-#: Smallest loss relative to |K|, and smallest growth of K' with ln omega relative to mu, of the start values.
+#: Smallest loss modulus relative to |K|, and smallest growth of K' with ln omega relative to mu, for start values.
 _LEAST = 1e-3
-#: Largest frequency, relative to the lowest one, of a slow test.
+#: Largest frequency of a slow test, relative to the lowest frequency of all tests.
 _SLOW = 1.5
-#: Largest strain, relative to the smallest of the sweeps, of a point of their smallest level: rigs reach an amplitude
-#: within some per cent.
+#: Largest strain of a point at the smallest level of the sweeps, relative to their smallest strain: rigs reach an
+#: amplitude within some per cent.
 _SMALLEST = 1.2
 #: Smallest range of ln omega that determines a slope.
 _LEAST_RANGE = 0.1
-#: m over mu, and alpha, of a usual filled rubber: start values if the data do not determine a slope.
+#: Ratio m/mu, and alpha, of a typical filled rubber: start values if the data do not determine a slope.
 _USUAL = (0.2, 0.25)
 #: Smallest and largest start value of alpha: slopes of filled rubbers.
 _ALPHA_RANGE = (0.1, 0.6)
@@ -75,7 +75,7 @@ def start_values(
     smallest = strain <= _SMALLEST * strain[~slow].min(initial=np.inf)
     log_omega = np.log(2.0 * np.pi * frequency[smallest])
     if not slow.all() and np.ptp(log_omega) >= _LEAST_RANGE:
-        least_loss = _LEAST_SHARE * modulus.imag.clip(min=0.0) + 1e-9 * mu  # above zero, for its logarithm
+        least_loss = _LEAST_SHARE * modulus.imag.clip(min=0.0) + 1e-9 * mu  # positive, because its logarithm is needed
         viscous_loss = np.maximum(modulus.imag - friction.imag, least_loss)
         alpha = float(np.clip(_slope(log_omega, np.log(viscous_loss[smallest])), *_ALPHA_RANGE))
         middle = float(np.exp(log_omega.mean()))

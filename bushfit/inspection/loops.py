@@ -8,7 +8,7 @@ from bushfit.caveat import Caveat
 from bushfit.effects.mistakes import MISTAKES
 from bushfit.fitting.loop_cycles import waveform
 from bushfit.fitting.measured_loop import MeasuredLoop
-from bushfit.fitting.prepare_loop import TOLD_MEAN, correlation_text, prepare_loop, recorded_means
+from bushfit.fitting.prepare_loop import REPORTED_MEAN, correlation_text, prepare_loop, recorded_means
 from bushfit.inspection.channels import EVEN_CLOCK, describe_sampling, odd_recording
 from bushfit.inspection.record import Findings, format_frequencies
 from bushfit.reading.measurement import Loop
@@ -98,7 +98,7 @@ def describe_loop(loop: Loop, labels: Mapping[str, Labels]) -> Findings:
         minutes = number(1.0 / frequency / 60.0, 2)
         sentence = f"one cycle takes {minutes} min, which is unusual; possible causes: {', or '.join(mistakes)}"
         odd.append(Caveat("slow_cycle", sentence))
-    if _SMALLEST_OFFSET * half_motion < abs(mean_motion) <= TOLD_MEAN * amplitude and prepared.datum is not None:
+    if _SMALLEST_OFFSET * half_motion < abs(mean_motion) <= REPORTED_MEAN * amplitude and prepared.datum is not None:
         sentence = (
             f"the mean displacement is {number(to_length * mean_motion, 3)} {length}, "
             f"{number(100 * mean_motion / half_motion, 2)} % of its amplitude: the fit uses the loop about its mean"
