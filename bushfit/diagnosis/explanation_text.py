@@ -53,17 +53,23 @@ def causes_text(candidates: Sequence[Composition], finding: Finding) -> list[str
 
     Returns:
         If every reported explanation is a recording mistake, a sentence that asks to check them. Otherwise a sentence
-        on the leads that no candidate contains, or that there are neither candidates nor leads; else nothing.
+        that there are neither candidates nor leads; else nothing.
     """
     claims = {c.best.claim.key if c.best.claim else None: c.best.claim for c in finding.reported}
     if all(claims.values()):
         return [f"check first whether {' or whether '.join(claim.sentence for claim in claims.values() if claim)}"]
+    return [] if candidates or finding.leads else ["no known effect explains the gap"]
+
+
+def leads_text(candidates: Sequence[Composition], finding: Finding) -> str:
+    """Sentence on the leads of a verdict (see `Finding`) that no candidate contains; "" without any.
+
+    A lead has a probability of 90 % or more, but describes the rubber in part only: `list_candidates` says why.
+    """
     leads = [name for name in finding.leads if not any(name in candidate.causes for candidate in candidates)]
-    if leads:
-        friction = any(get_effect(name).is_friction for name in leads)
-        law = "the friction law of the model does not hold for this rubber: " if friction else ""
-        return [f"{law}{join_names(leads)} would reduce the gap, but not close it"]
-    return [] if candidates else ["no known effect explains the gap"]
+    friction = any(get_effect(name).is_friction for name in leads)
+    law = "the friction law of the model does not hold for this rubber: " if friction else ""
+    return f"{law}{join_names(leads)} would reduce the gap, but not close it" if leads else ""
 
 
 def explanation_odds(finding: Finding) -> Odds:

@@ -18,6 +18,7 @@ from bushfit.diagnosis.explanation_text import (
     causes_text,
     explanation_odds,
     format_amount,
+    leads_text,
     list_candidates,
     probability_text,
     undecided_text,
@@ -283,11 +284,12 @@ class DiagnosisWriter:
         fitted = replace(fitted, at_bound={**fitted.at_bound, **ends})
         odds = explanation_odds(self.finding)
         result = with_alternatives(odds.averaged(fitted), self.hypotheses, base, search.settings.tolerance)
-        amounts = filter(None, (format_amount(entry.name, result) for entry in entries))
+        amounts = [format_amount(entry.name, result) for entry in entries]
+        leads = "" if places else leads_text(self._candidates, self.finding)  # else measure again first
         rest = [f"the rest: {join_names(remainder)}"] if remainder else []
         return Diagnosis(
             verdict or self.finding.verdict,
-            "; ".join([summary, *amounts, *rest]),
+            "; ".join(filter(None, [summary, *amounts, leads, *rest])),
             tuple(entries),
             where,
             where if after is base else find_regions(after),

@@ -142,15 +142,14 @@ def decide_verdict(hypotheses: Sequence[Hypothesis], tolerance: float, *, gap_st
         # all that is probable has these parts; the tests show no other part, but perhaps that there is one
         return _verdict_on_parts(likely, nothing, leads)
     reported, fits = tuple(likely[:MOST_REPORTED]), first.best.p_value >= DOES_NOT_FIT
-    if (
-        fits and common and all(part.startswith("part: ") for part in common)
-    ):  # whatever else there is, this has to go first
+    only_faults = common and all(part.startswith("part: ") for part in common)
+    if fits and only_faults:  # whatever else there is, this has to go first
         return Finding("unexplained", nothing, reported, leads)
     share = {name: sum(c.probability for c in compositions if name in c.names) for name in first.names}
     names = tuple(name for name in first.names if share[name] >= NAMED)
     nameless = sum(composition.probability for composition in likely if composition.parts == {"unnamed"})
     if len(likely) <= MOST_REPORTED and nameless < 0.5 and fits:
-        return Finding("ambiguous", nothing, reported, names=names)
+        return Finding("ambiguous", nothing, reported, leads, names)
     if names and first.unnamed and fits:  # whatever the compound does beside them
         return Finding("partly", nothing, reported, leads, names)
     return Finding("described", nothing, reported, leads)
@@ -176,7 +175,7 @@ def _verdict_on_parts(likely: Sequence[Composition], nothing: float, leads: Sequ
     if not first.causes or curve or compensated or not fits:
         return Finding("described", nothing, reported, leads)
     partly = first.unnamed or best.levels or first.faulty_parts or (best.claim and best.effects)
-    return Finding("partly" if partly else "named", nothing, reported, names=first.names)
+    return Finding("partly" if partly else "named", nothing, reported, leads, first.names)
 
 
 def _leads(pairs: Sequence[tuple[Hypothesis, float]]) -> tuple[str, ...]:

@@ -227,7 +227,7 @@ def test_of_more_than_can_be_told_it_is_described_by_what_nearly_all_have_in_com
 def test_names_stand_beside_what_has_none_where_they_change_most(last, verdict):
     finding = decide_verdict([one("inertia+unnamed", 0.99, size=0.05, last=last), one("inertia", 0.01)], TOLERANCE)
     assert finding.verdict == verdict
-    assert finding.leads == (("inertia",) if verdict == "described" else ())
+    assert finding.leads == ("inertia",)
     assert told(finding) == {"inertia+unnamed": 1.0}
 
 
