@@ -10,10 +10,12 @@ import numpy as np
 import pytest
 
 from bushfit.campaign.campaign import Campaign, load_campaign
+from bushfit.campaign.copies import group_copies
 from bushfit.campaign.session import SessionTest, planned_session, session
 from bushfit.campaign.simulated import SimulatedLoop, SimulatedSweep
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.geometry import Bushing, Direction, Specimen, unit_strain
+from bushfit.reading.measurement import Loop
 
 BUSHING = """
 [bushing]
@@ -42,7 +44,6 @@ COUPON = Specimen("DMA", "modulus")
 
 @pytest.fixture
 def folder(tmp_path) -> Path:
-    """A folder with the tables that the campaigns name."""
     (tmp_path / "loop.csv").write_text(LOOP)
     (tmp_path / "sweep.csv").write_text(SWEEP)
     return tmp_path
@@ -76,18 +77,12 @@ waveform = "sine"
     assert campaign.sweeps[0].amplitude[0] == pytest.approx(0.05e-3)
     (folder / "loop.csv").write_text(LOOP)
     (folder / "more").mkdir()
-    (folder / "more/loop.csv").write_text(LOOP.replace(",0\n", ",0.01\n"))
+    (folder / "more/loop.csv").write_text(LOOP.replace("[N]", "[kN]"))
     campaign = campaign_from(BUSHING + TESTS + '[[loops]]\nfile = "more/loop.csv"\ndirection = "axial"\n', folder)
     assert [loop.name for loop in campaign.loops] == ["loop.csv", "more/loop.csv"]
     # A least modulus of 0 says that it is not negative; a logarithm has no 0.
     limits = campaign_from(SIMULATE + '[fit.mu]\nmin = "0 MPa"\nmax = "1e6 MPa"', folder).fit.parameters["mu"]
     assert (limits.min, limits.max) == (1e3, 1e9)
-
-
-def test_without_a_bushing_a_campaign_has_the_name_of_its_first_specimen(folder):
-    specimens = 'specimens = [{ name = "DMA", kind = "modulus" }, { name = "sheet", kind = "modulus" }]'
-    specimens += '\n[compound]\nhardness = "61 Shore A"\nfiller = "27 phr"\n'
-    assert campaign_from(specimens, folder).name == "DMA"
 
 
 def test_settings_arrive_in_si(folder):
@@ -179,3 +174,14 @@ def test_a_planned_sweep_has_its_own_repeats_else_those_of_the_session():
     tests = [sweep, SimulatedLoop(Direction.AXIAL, 1e-3, 1.0), SimulatedSweep(Direction.AXIAL, (3e-3,), (5.0,))]
     conditions = planned_session(bushing, tests, repeats=2)
     assert [np.size(test.largest_strain) for test in conditions] == [18, 1, 2]
+
+
+@pytest.mark.parametrize("rows", [slice(None), slice(0, None, 2), slice(300, 2400)], ids=["all", "second", "cut"])
+@pytest.mark.parametrize("digits", [6, 4])
+def test_a_loop_that_is_exported_again_is_used_once(rows, digits):
+    rng, time = np.random.default_rng(11), np.arange(3000) * 0.01
+    noisy = [np.round(np.sin(0.2 * np.pi * time) + 3e-3 * rng.normal(size=time.size), 6) for _ in range(4)]
+    first, repeat = (Loop("", Direction.AXIAL, time, *columns) for columns in (noisy[:2], noisy[2:]))
+    again = Loop("", Direction.AXIAL, time[rows] - time[rows][0], *(np.round(c[rows], digits) for c in noisy[:2]))
+    groups = [{id(loop) for loop in group} for group in group_copies([again, repeat, first])]
+    assert sorted(groups, key=len) == [{id(repeat)}, {id(first), id(again)}]
