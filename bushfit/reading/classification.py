@@ -33,7 +33,7 @@ from bushfit.reading.inference import (
     name_parallel_spring,
 )
 from bushfit.reading.roles import PAIRS
-from bushfit.reading.si_columns import column_of, first_numbers, is_angular, refuse_second_unit
+from bushfit.reading.si_columns import choose_column, column_of, first_numbers, is_angular, refuse_second_unit
 from bushfit.reading.table import Table
 from bushfit.reading.times import parse_clock
 
@@ -68,23 +68,23 @@ def classify(
     """
     roles: dict[str, Column] = {}
     extremes: dict[tuple[str, Extreme], Column] = {}
-    rejected: set[str] = set()
-    role_by_index, terms = _stated_indices(table, vocabulary, columns)
+    stated_columns = _stated_columns(table, vocabulary, columns)
+    excluded = {role for role, _ in stated_columns.values()}
     vague = {n for n, header in enumerate(table.headers) if plain_name(header) == "k" or header in "fF"}
     for index, header in sorted(enumerate(table.headers), key=lambda column: column[0] in vague):  # after K* and freq
         heading = vocabulary.heading(header, table.layout.units[index]) if header else None
-        if index in role_by_index:
-            meaning = Vocabulary({"": [units.split_header(header)[0]]}, {"": header}).heading(header)
-            heading = replace(meaning or Heading(""), role=role_by_index[index])
-        elif heading and heading.role in {*role_by_index.values(), *rejected}:
+        added = list[int]()
+        if index in stated_columns:
+            role, added = stated_columns[index]
+            heading = Vocabulary({role: [header]}, {role: header}).heading(header) or Heading(role)
+        elif heading and heading.role in excluded:
             continue
         if heading is None or (index in vague and heading.role in roles):
             continue
         is_empty = heading.role == "time" and table.first_row[index] == ""
         if is_empty and all(row[index] == "" for row in table.first_rows) and table.labels_above.sampling:
             continue  # the X_Value of LabVIEW, whose step is stated above
-        role, column = heading.role, column_of(table, heading, index, stated_units.get(heading.role))
-        column = replace(column, terms=tuple((term, 1.0) for term in terms.get(index, ())))
+        role, column = heading.role, column_of(table, heading, index, stated_units.get(heading.role), added)
         if heading.extreme:
             extremes.setdefault((role, heading.extreme), column)
         elif role not in roles:
@@ -92,7 +92,7 @@ def classify(
         elif role == "preload" and _is_force(column) != _is_force(roles[role]):
             roles[role] = column if _is_force(column) else roles[role]  # the mean displacement states the same
         elif role in ROLE_SETS["replaceable"]:
-            rejected.add(role)
+            excluded.add(role)
             del roles[role]
         else:
             roles[role] = _preferred_column(table, roles[role], column)
@@ -177,9 +177,9 @@ def _require_plain_names(table: Table, roles: Mapping[str, Column]) -> None:
         raise table.header_error(**ERRORS["numbered_columns"], found=", ".join(table.headers), hint=hint)
 
 
-def _stated_indices(
+def _stated_columns(
     table: Table, vocabulary: Vocabulary, columns: Mapping[str, str]
-) -> tuple[dict[int, str], dict[int, list[int]]]:
+) -> dict[int, tuple[str, list[int]]]:
     """Find the columns that the user states by their number, or as a sum "A + B"; other headers are only checked.
 
     Args:
@@ -188,13 +188,15 @@ def _stated_indices(
         columns: header or number of a column as the user states it, by role.
 
     Returns:
-        Role, such as "force", by index of the column; and the indices of columns that are added to it, by its index.
+        Role, such as "force", and indices of the columns that are added, by index of the column.
 
     Raises:
         NoColumnError: a stated header or number that the file does not have.
-        MeasurementError: one header for two roles, or a sum of columns in different units.
+        MeasurementError: one header for two roles.
     """
-    indices, role_by_text, terms = dict[int, str](), dict[str, str](), dict[int, list[int]]()
+    stated, role_by_text = dict[int, tuple[str, list[int]]](), dict[str, str]()
+    index_of = {header: table.headers.index(header) for header in table.headers if header}
+    index_of |= {str(index + 1): index for index in range(len(table.headers))}
     named_roles = vocabulary.roles([header for header in table.headers if header])
     for role, text in columns.items():
         if (first_role := role_by_text.setdefault(plain(text), role)) != role:
@@ -204,17 +206,10 @@ def _stated_indices(
                 expected="a column for each",
                 hint=f'state another column for one of the two: columns = {{ {role} = "..." }} in the campaign',
             )
-    for role, text in columns.items():
-        number = int(text) if text.isdecimal() and len(text) < 5 else 0
-        parts = text.split(" + ")
-        if len(parts) > 1 and set(parts) <= set(table.headers) and role not in named_roles:
-            first, *further = map(table.headers.index, parts)
-            number, terms[first] = first + 1, further
-            written = {table.layout.units[n] or split_unit(table.headers[n])[1] for n in (first, *further)}
-            if len(written) > 1:
-                raise table.header_error("columns in different units cannot be added", found=text, expected="one unit")
-        if 1 <= number <= len(table.headers):
-            indices[number - 1] = role
+        parts = [text] if text in index_of else text.split(" + ")
+        if set(parts) <= index_of.keys() and (len(parts) > 1 or text.isdecimal()):
+            first, *added = (index_of[part] for part in parts)
+            stated[first] = role, added
         elif role not in named_roles:
             near = next(iter(get_close_matches(text, table.headers if table.is_table else (), 1, _ALIKE)), "")
             advice = f'did you mean "{near}"?' if near else "name one of this file:"
@@ -222,7 +217,7 @@ def _stated_indices(
             expected = f"the header that was stated for the {role.replace('_', ' ')}, or its number"
             hint = f'{advice} columns = {{ {role} = "{near or "..."}" }} in the campaign'
             raise table.header_error(problem, kind=NoColumnError, expected=expected, hint=hint)
-    return indices, terms
+    return stated
 
 
 def _preferred_column(table: Table, first: Column, second: Column) -> Column:
@@ -257,6 +252,6 @@ def _preferred_column(table: Table, first: Column, second: Column) -> Column:
     elif is_equal and all(row[first.index] == row[second.index] for _, row in table.rows()):
         return first
     choices = [str(column.index + 1) if is_numbered else column.header for column in both]
-    keys = " or ".join(f'columns = {{ {role} = "{choice}" }}' for choice in choices)
-    hint = f"{'give each column its own header, or ' if is_numbered else ''}choose it in the campaign: {keys}"
+    keys = f"choose it in the campaign: {choose_column(role, choices)}"
+    hint = f"give each column its own header, or {keys}" if is_numbered else keys
     raise table.header_error(problem, found=f"{first.header}, {second.header}", expected=expected, hint=hint)

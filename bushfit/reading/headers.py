@@ -380,6 +380,8 @@ def units_in_header(header: str) -> Iterator[str]:
 def _splits(text: str) -> Iterator[tuple[str, str | None, bool]]:
     """Yield each split of a header, such as "force_N": name, unit or None, and True if the unit is in brackets."""
     name, unit = units.split_header(text)
+    if unit and name[-1:] in ("]", ")") and not units.is_unit(unit):
+        yield from _splits(name)  # "Force [kN] (front)"
     yield name, unit, True
     if unit is None:
         for end in reversed(list(_NAME_END.finditer(name))):

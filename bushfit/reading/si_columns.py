@@ -26,7 +26,7 @@ from bushfit.reading.headers import (
     split_unit,
     units_in_header,
 )
-from bushfit.reading.names import named_quantities
+from bushfit.reading.names import named_direction, named_quantities
 from bushfit.reading.numerals import plainest_value
 from bushfit.reading.roles import OF_MOTION, names_for_motion, si_unit
 
@@ -35,6 +35,8 @@ if TYPE_CHECKING:
 
 #: Number above zero of a stated multiple of a unit, such as 200 N for the force of 1 V.
 _MULTIPLE = re.compile(r"^(?=[\d.]*[1-9])\d+\.?\d*(?=\s+[^\W\d_])")
+#: Letter of an axis in the name of a force: "Fx", "F_z 1", "Load Y".
+_AXIS = re.compile(r"(?:^|[\W_])[A-Z]?_?([XYZ])(?![^\W\d_])", re.IGNORECASE)
 #: Starts of the names of an angular frequency.
 _ANGULAR = ("angular", "angfreq", "omega", "ω", "kreisfrequenz", "pulsa", "角频率")
 #: Start of the name of a logarithm, in the spelling that `plain` returns.
@@ -145,14 +147,32 @@ def columns_key(table: Table, role: str, unit: str) -> str:
     ]
     fitting, volts = ([text for text, one in unused if units.is_compatible(one, si)] for si in (unit, "V"))
     fitting, volts = [] if unit == "1" else fitting, volts if role in LOOP_COLUMNS else []
-    key = " or ".join(f'columns = {{ {role} = "{header}" }}' for header in (fitting or volts)[:3] or ["..."])
-    if role == "force" and len(fitting) == 2:
-        both = f'columns = {{ force = "{" + ".join(fitting)}" }}'
-        return f"{key} if this cell carries the load alone, or {both} if both share the load"
+    key = choose_column(role, fitting or volts or ["..."])
     if fitting or volts:
         return key if fitting else f'{key}, and the size of one volt: units = {{ {role} = "... {example}" }}'
     is_named = any(with_unit.heading(header) for header, _ in unused)
     return f'units = {{ {role} = "{example}" }}' if is_named else key
+
+
+def choose_column(role: str, headers: Sequence[str]) -> str:
+    """Suggest campaign keys that choose one of several columns or, for forces in one direction, their sum.
+
+    Args:
+        role: role of the columns, such as "force".
+        headers: their headers, or their numbers; up to three are listed.
+
+    Returns:
+        Keys such as 'columns = { force = "F1" } or columns = { force = "F2" }'.
+    """
+    by_axis = dict[object, list[str]]()
+    for header in headers if role == "force" else ():
+        letter = _AXIS.search(header)
+        by_axis.setdefault(named_direction([header]) or (letter and letter[1].lower()), []).append(header)
+    alone, sums = (
+        " or ".join(f'columns = {{ {role} = "{text}" }}' for text in texts)
+        for texts in (headers[:3], [" + ".join(group) for group in by_axis.values() if len(group) > 1])
+    )
+    return f"{alone} if this cell carries the load alone, or {sums} if these cells share the load" if sums else alone
 
 
 def refuse_other_motion(table: Table, role: str, headers: Sequence[str] | None = None) -> None:
@@ -191,7 +211,9 @@ def quantity_above(table: Table, unit: str) -> str | None:
     return next(iter(texts)) if len(texts) == 1 else None
 
 
-def column_of(table: Table, heading: Heading, index: int, stated_unit: str | None = None) -> Column:
+def column_of(
+    table: Table, heading: Heading, index: int, stated_unit: str | None = None, added: Sequence[int] = ()
+) -> Column:
     """Make the column of a header, with the unit that the user states, or else the unit in the header or units row.
 
     Args:
@@ -199,21 +221,31 @@ def column_of(table: Table, heading: Heading, index: int, stated_unit: str | Non
         heading: meaning of the header: role (quantity, such as "force"), unit and convention.
         index: index of the column.
         stated_unit: unit that the user states; None without one.
+        added: indices of columns whose numbers are added to those of the column.
 
     Returns:
         Column with its unit and convention; its numbers are not converted.
+
+    Raises:
+        UnitError: two units for the column.
+        MeasurementError: columns in different units are to be added.
     """
     multiple = _MULTIPLE.sub(r"x \g<0>", stated_unit or "")
     from_user, in_row = (parse_unit(text) for text in (multiple, table.layout.units[index]))
     in_header = parse_unit(heading.unit or "")
     texts = [from_user[0]] if stated_unit else sorted({in_header[0], in_row[0]} - {""})
+    texts = [text for text in texts if len(texts) < 2 or units.is_unit(text)] or texts  # "Force (front)" above "kN"
     conventions = {from_user[1] or part for part in (heading.convention, in_header[1], in_row[1], from_user[1]) if part}
     logarithm = from_user[2] or in_row[2] or in_header[2] or heading.logarithm
     unit, convention = next(iter(texts), None), next(iter(conventions), None)
     column = Column(heading.role, unit, convention, logarithm, header=table.headers[index], index=index)
     if len(texts) > 1 or len(conventions) > 1:
         raise _two_units(table, column, texts if len(texts) > 1 else sorted(conventions))
-    return column
+    terms = [column_of(table, replace(heading, unit=split_unit(table.headers[n])[1]), n, stated_unit) for n in added]
+    if {term.unit for term in terms} - {unit}:
+        headers = " + ".join(term.header for term in (column, *terms))
+        raise table.header_error("columns in different units cannot be added", found=headers, expected="one unit")
+    return replace(column, terms=tuple((term.index, 1.0) for term in terms))
 
 
 def refuse_second_unit(table: Table, column: Column) -> None:
