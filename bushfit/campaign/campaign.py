@@ -289,7 +289,8 @@ def reader_keywords(
     """
     listed_tests = set()
     sources = [
-        (os.path.normpath(path.parent / test.file), test.sheet, test.temperature, test.preload) for test in tests
+        (os.path.normpath(path.parent / test.file), test.sheet, test.header_line, test.temperature, test.preload)
+        for test in tests
     ]
     counts = Counter(sources)
     for test, source, name in zip(tests, sources, names, strict=True):

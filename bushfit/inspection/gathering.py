@@ -23,7 +23,7 @@ from bushfit.inspection.labels import count_temperatures
 from bushfit.inspection.opening import inspect_file
 from bushfit.inspection.recognition import open_table, recognize_table
 from bushfit.inspection.record import Inspection
-from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS
+from bushfit.reading.headers import ERRORS, LOOP_COLUMNS, SWEEP_COLUMNS
 from bushfit.reading.instruments import word_for_part
 from bushfit.reading.labelled import same_text
 from bushfit.reading.layout import FileFormat
@@ -96,11 +96,7 @@ def gather(paths: Sequence[Path], test_options: Mapping[str, Any]) -> tuple[list
         of_path = [test for file in files for test in split_sheets(file, test_options, left_out)]
         sources += of_path
         if not of_path:
-            problem = "no file of this folder contains a test"
-            found = "; ".join(map(str, left_out)) or "nothing"
-            expected = "loops or sweeps, as " + ", ".join(TEST_FILES[:4]) + " or .xlsx"
-            hint = "bushfit inspect FILE shows how bushfit reads a file"
-            raise NoTestError(problem, file=path, found=found, expected=expected, hint=hint)
+            raise NoTestError(**ERRORS["no_test"], file=path, found="; ".join(map(str, left_out)) or "nothing")
     tests = [test for source in distribute_options(sources, test_options) for test in split_rows(source, left_out)]
     forces = [labels_in_names(test.sheet or "", test.file.stem).force for test in tests]
     if len({*forces} - {None}) > 1:
@@ -185,9 +181,10 @@ def split_sheets(file: TestSource, test_options: Mapping[str, Any], left_out: li
 
 
 def split_rows(source: TestSource, left_out: list[Caveat]) -> list[TestSource]:
-    """Split a file with columns for direction, part number, run, temperature or preload into one test for each level.
+    """Split a file with several tables, or with columns for direction, part number, run, temperature or preload.
 
-    The runs of a sweep are repeats and are not split. The runs of a loop are split only if time restarts in each run.
+    Each table, and each level in such a column, is a test. The runs of a sweep are repeats and are not split. The runs
+    of a loop are split only if time restarts in each run.
 
     Args:
         source: file or sheet.
@@ -211,6 +208,7 @@ def split_rows(source: TestSource, left_out: list[Caveat]) -> list[TestSource]:
             if not columns:
                 rows_of = {(): np.arange(sum(1 for _ in table.rows()))}
             levels = {row: split_conditions(table, rows, test_options) for row, rows in rows_of.items()}
+        below = () if test_options.get("header_line") else table.other_tables
     except BushfitError:  # which the inspection of the file reports
         return [source]
     for texts, tests_at_levels in levels.items():
@@ -229,7 +227,8 @@ def split_rows(source: TestSource, left_out: list[Caveat]) -> list[TestSource]:
         elif texts:
             why = "other values were stated" if is_direction else "the direction is unknown"
             left_out.append(Caveat("left_out", f"rows of {', '.join(texts)} are not used: {why}").about(source))
-    return tests or [source]
+    of_tables = [replace(source, test_options={**test_options, "header_line": line}) for line, _ in below]
+    return [*(tests or [source]), *of_tables]
 
 
 def distribute_options(sources: Sequence[TestSource], test_options: Mapping[str, Any]) -> list[TestSource]:

@@ -19,7 +19,7 @@ from bushfit.inspection.recognition import recognize_table, tested_body
 from bushfit.inspection.record import ColumnDescription, Findings, Inspection, Kind
 from bushfit.inspection.sweeps import describe_sweep
 from bushfit.reading.finding import direction_of_table
-from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS
+from bushfit.reading.headers import ERRORS, LOOP_COLUMNS, SWEEP_COLUMNS
 from bushfit.reading.layout import DELIMITERS
 from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import Loop, Sweep
@@ -113,11 +113,7 @@ def read_history(file: Path, test_options: Mapping[str, Any]) -> tuple[Loop, Dir
     """
     table, is_sweep = recognize_table(file, test_options)
     if is_sweep:
-        raise table.header_error(
-            "this is a sweep already",
-            expected="a raw history: time, displacement, force",
-            hint="list this file in the campaign under [[sweeps]]",
-        )
+        raise table.header_error(**ERRORS["sweep_already"])
     direction = direction_of_table(table, test_options.get("direction"))
     entry = campaign_entry(table, direction, test_options, is_sweep=False)
     return read_loop(**reader_arguments(table, direction or Direction.AXIAL, entry, LoopFile)), direction

@@ -80,8 +80,7 @@ def recognize_table(file: Path, test_options: Mapping[str, Any]) -> tuple[Table,
         resonance = open_table(content, RESONANCE_COLUMNS, test_options)
     if resonance and is_resonance(resonance):
         hint = f'to convert it to a sweep: bushfit reduce {quote_path(file)} --mass "..."'
-        problem, expected = "this is a resonance test, not a sweep", "loops and sweeps"
-        raise resonance.error(problem, kind=ResonanceTestError, expected=expected, hint=hint)
+        raise resonance.error(**ERRORS["resonance_test"], kind=ResonanceTestError, hint=hint)
     if not opened:
         errors = [error for _, error in failed]
         raise NoTestError(**vars(next((one for one in errors if one.problem != "there is no known header"), errors[0])))

@@ -14,6 +14,7 @@ from bushfit.caveat import Caveat
 from bushfit.effects.contract import Array
 from bushfit.errors import CampaignError, printable
 from bushfit.geometry import Place, Specimen
+from bushfit.reading.headers import ERRORS
 from bushfit.reading.instruments import word_for_part
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.reading.tablefile import folder_name
@@ -212,11 +213,8 @@ def campaigns_of_parts(
     for inspection in files:
         of_parts.setdefault(inspection.part or "", []).append(inspection)
     if unknown := of_parts.pop("", []):
-        problem = "the specimen number of this test is not stated"
         found = f"specimens {', '.join(of_parts)} in other files"
-        expected = "a specimen number in every file, or files of a single part"
-        hint = "--specimen-number selects the tests of one part; files that state no part are included"
-        raise CampaignError(problem, file=unknown[0].file, found=found, expected=expected, hint=hint)
+        raise CampaignError(**ERRORS["no_specimen_number"], file=unknown[0].file, found=found)
     texts = {listed_in: f"# a campaign of each part: bushfit batch {listed_in}\n"}
     for number, (part, tests) in enumerate(of_parts.items(), start=1):
         file = f"{folder_name(part)}.toml"

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -69,7 +69,7 @@ def find_lines_above(table: Table) -> list[Line]:
         elif is_step and (unit or split_unit(header)[1]) and len({row[index] for row in table.first_rows} - {""}) == 1:
             lines.append(Line(last, [header, table.first_row[index], unit]))
     marks = {mark: header for header in table.headers for mark in _FOOTNOTE_MARK.findall(header)}
-    for line in table.source.tail():
+    for line in () if table.other_tables else table.source.tail():  # which may be notes of another table
         texts = list(map(str, cells_of(line, layout.delimiter)))
         is_note = not (any(map(is_like_number, texts)) or is_summary_row(texts) or layout.is_repeated(texts))
         if line.number > last and is_note:
@@ -109,10 +109,8 @@ def find_remarks(table: Table) -> tuple[Caveat, ...]:
         if read[0] != read[1]:
             meanings = " or ".join(f'"{form.text[:_LONGEST_QUOTE]}"' for form in forms)
             place = f"line {line.number}" if line.number else f'the name "{line.text}"'
-            sentence = (
-                f"{place} can be read in two ways: {meanings}; the number is not used. Options state what is right"
-            )
-            warnings.append(Caveat("remark", sentence))
+            sentence = f"{place} can be read in two ways: {meanings}; the number is not used"
+            warnings.append(Caveat("remark", f"{sentence}. Options state what is right"))
     rows = [] if all(is_like_number(str(cell)) for cell in table.first_row) else table.first_rows
     texts = Counter(cell for row in rows for cell in row if isinstance(cell, str) and cell[:1].isalpha())
     warnings += [
@@ -120,12 +118,13 @@ def find_remarks(table: Table) -> tuple[Caveat, ...]:
         for cell, count in texts.items()
         if is_remark(cell)
     ]
-    if hidden := [number for number in table.source.hidden if number > table.layout.header_line]:
+    source = table.source
+    if hidden := [number for number in source.hidden if number > table.layout.header_line]:
         sentence = f"{len(hidden)} rows from row {hidden[0]} on are hidden in the workbook, but are read"
         warnings.append(Caveat("hidden_rows", sentence))
-    if table.source.divided:
+    if source.divided:
         sentence = (
-            f"{table.source.divided} cells are shown divided by 1000 by their number format: the shown numbers are read"
+            f"{source.divided} cells are shown divided by 1000 by their number format: the shown numbers are read"
         )
         warnings.append(Caveat("divided_cells", sentence))
     return tuple(warnings)
@@ -179,7 +178,7 @@ def label_columns(
     return columns | {"block": [str(number) for number in range(1, len(blocks) + 1)]}
 
 
-def is_of_block(line: Line, columns: Sequence[str], vocabulary: Vocabulary) -> bool:
+def is_of_block(line: Line, columns: Collection[str], vocabulary: Vocabulary) -> bool:
     """True if a line above the first block states an operating point, or one of some columns, for this block alone.
 
     Args:
@@ -190,9 +189,8 @@ def is_of_block(line: Line, columns: Sequence[str], vocabulary: Vocabulary) -> b
     Returns:
         True or False; a line for all blocks is False.
     """
-    return any(
-        header in columns or _role(header) in ("amplitude", "frequency") for header in stated_above([line], vocabulary)
-    )
+    headers = stated_above([line], vocabulary)
+    return any(header in columns or _role(header) in ("amplitude", "frequency") for header in headers)
 
 
 def stated_above(lines: Sequence[Line], vocabulary: Vocabulary) -> dict[str, str | float]:

@@ -20,12 +20,8 @@ from bushfit.reading.rejected import begins_other_table
 from bushfit.reading.roles import UNIT_NAMES, is_test
 from bushfit.reading.source import Channels, RowSource, Sheet, Text, cells_of
 
-#: Largest text that is searched for blocks without their own headers [bytes]; chosen: some 100,000 rows.
-_MOST_BYTES = 1 << 22
 #: Letter that does not begin an exponent.
 _LETTER = re.compile(r"[^\W\d_eEdD]|[eEdD](?![+-]?\d)")
-#: Bytes that occur in rows of numbers, which cannot begin a block.
-_NUMERIC = b"0123456789.,+-eEdD \t\r\n"
 #: Complex number: "1500+150i", "(1500 + 150j)".
 _COMPLEX = re.compile(
     r"\(?\s*([+-]?[\d.,]+(?:[eEdD][+-]?\d+)?)\s*([+-]\s*[\d.,]+(?:[eEdD][+-]?\d+)?)\s*\*?\s*[ij]\s*\)?"
@@ -122,7 +118,7 @@ def combine_blocks(source: RowSource, layout: Layout, vocabulary: Vocabulary) ->
         first = [*sides[0].shared, *sides[0].columns]
         headers = (*(layout.headers[index] for index in sides[0].shared), *sides[0].headers)
         layout = replace(layout, headers=headers, units=tuple(layout.units[index] for index in first))
-    elif isinstance(source, Text) and _is_one_block(source, layout):
+    elif isinstance(source, Text) and source.is_one_block(layout):
         return source, layout
     else:
         blocks = _stacked_blocks(source, layout, vocabulary)
@@ -143,19 +139,8 @@ def combine_blocks(source: RowSource, layout: Layout, vocabulary: Vocabulary) ->
     layout = replace(layout, headers=(*layout.headers, *added), units=(*layout.units, *[""] * len(added)))
     head = [line for line in source.head if line.number < layout.header_line]
     of_titles = {line.number for block in blocks for line in block.above}
-    above = [
-        line for line in head if not (line.number in of_titles if sides else is_of_block(line, [*added], vocabulary))
-    ]
+    above = [line for line in head if not (line.number in of_titles if sides else is_of_block(line, added, vocabulary))]
     return _with_plain_cells(Sheet(source.sheet or "", content, above=above, numbers=numbers), layout)
-
-
-def _is_one_block(source: Text, layout: Layout) -> bool:
-    """True if the bytes of a text rule out a second block below the header."""
-    start, end = source.offset(layout.header_line - 1), source.offset(layout.lines_before_data)
-    if len(source.data) > _MOST_BYTES:
-        header = source.data[start : source.offset(layout.header_line)].strip()
-        return source.data.find(header, start + len(header)) < 0
-    return not source.data[end:].translate(None, _NUMERIC + layout.delimiter.encode())
 
 
 def _find_sides(layout: Layout, vocabulary: Vocabulary) -> list[Side]:

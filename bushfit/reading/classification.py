@@ -194,30 +194,30 @@ def _stated_columns(
         NoColumnError: a stated header or number that the file does not have.
         MeasurementError: one header for two roles.
     """
-    stated, role_by_text = dict[int, tuple[str, list[int]]](), dict[str, str]()
+    roles, role_by_text = dict[int, tuple[str, list[int]]](), dict[str, str]()
     index_of = {header: table.headers.index(header) for header in table.headers if header}
     index_of |= {str(index + 1): index for index in range(len(table.headers))}
     named_roles = vocabulary.roles([header for header in table.headers if header])
     for role, text in columns.items():
         if (first_role := role_by_text.setdefault(plain(text), role)) != role:
             raise table.header_error(
-                "one column is named for two roles",
+                **ERRORS["two_roles"],
                 found=f'"{text}" for the {first_role.replace("_", " ")} and the {role.replace("_", " ")}',
-                expected="a column for each",
                 hint=f'state another column for one of the two: columns = {{ {role} = "..." }} in the campaign',
             )
+    for role, text in columns.items():
         parts = [text] if text in index_of else text.split(" + ")
         if set(parts) <= index_of.keys() and (len(parts) > 1 or text.isdecimal()):
             first, *added = (index_of[part] for part in parts)
-            stated[first] = role, added
-        elif role not in named_roles:
+            roles[first] = role, added
+        elif text.isdecimal() or role not in named_roles:
             near = next(iter(get_close_matches(text, table.headers if table.is_table else (), 1, _ALIKE)), "")
             advice = f'did you mean "{near}"?' if near else "name one of this file:"
             problem = f'there is no column "{text}"'
             expected = f"the header that was stated for the {role.replace('_', ' ')}, or its number"
             hint = f'{advice} columns = {{ {role} = "{near or "..."}" }} in the campaign'
             raise table.header_error(problem, kind=NoColumnError, expected=expected, hint=hint)
-    return stated
+    return roles
 
 
 def _preferred_column(table: Table, first: Column, second: Column) -> Column:

@@ -10,9 +10,9 @@ from bushfit.errors import BushfitError, MeasurementError, error_location
 from bushfit.geometry import TRANSLATION, Direction, Motion
 from bushfit.reading.blocks import combine_blocks
 from bushfit.reading.classification import classify
-from bushfit.reading.headers import ALL_COLUMNS, HINTS, Vocabulary
+from bushfit.reading.headers import ALL_COLUMNS, ERRORS, LOOP_COLUMNS, Vocabulary
 from bushfit.reading.labelled import Rows, select_rows
-from bushfit.reading.layout import DELIMITERS, FileFormat, Layout, find_layout
+from bushfit.reading.layout import DELIMITERS, MOST_HEAD_LINES, FileFormat, Layout, find_layout
 from bushfit.reading.names import direction_of_file, named_direction
 from bushfit.reading.parts import OpenedFile, open_file
 from bushfit.reading.reshape import reshape_table
@@ -20,8 +20,6 @@ from bushfit.reading.roles import PAIRS, is_test, names_for_motion
 from bushfit.reading.source import RowSource, Sheet
 from bushfit.reading.table import Table
 from bushfit.reading.wide import unpivot
-
-_EXPECTED_HEADER = 'a header row such as "time [s],displacement [mm],force [N]"'
 
 
 def find_table(
@@ -56,14 +54,14 @@ def find_table(
     columns, stated_units, header_line = dict(columns or {}), dict(stated_units or {}), opened.stated.header_line
     named = {role: text for role, text in columns.items() if not text.isdecimal()}
     vocabulary = Vocabulary(names_for_motion(names, motion), named, stated_units)
-    may_be_wide = "amplitude" in names and header_line is None
-    layouts = [
-        (may_be_wide and unpivot(*as_written, opened.file, vocabulary)) or in_one
-        for as_written, in_one in _locate(opened, named, stated_units)
-    ]
+    every_name = Vocabulary(ALL_COLUMNS, named, stated_units)
+    may_be_wide, layouts = "amplitude" in names and header_line is None, list[tuple[RowSource, Layout]]()
+    for as_written, in_one in _locate(opened, named, stated_units):
+        is_loop = {"displacement", "force"} <= Vocabulary(LOOP_COLUMNS, named).roles(as_written[1].headers)
+        wide = unpivot(*as_written, opened.file, vocabulary) if may_be_wide and not is_loop else None
+        layouts.append(wide or in_one)
     if len(layouts) > 1:
         layouts = [entry for entry in layouts if len(vocabulary.roles(entry[1].headers) - {"time"}) > 1]
-    every_name = Vocabulary(ALL_COLUMNS, named, stated_units)
     if len(opened.parts) > 1 and not any(is_test(every_name.roles(layout.headers)) for _, layout in layouts):
         with suppress(BushfitError):  # the parts together are no test either
             together = find_table(opened.join_sheets(), names, columns, stated_units, motion=motion, rows=rows)
@@ -74,15 +72,11 @@ def find_table(
         raise opened.part_error([source for source, _ in layouts])
     table = Table(opened, *layouts[0], names, motion)
     if header_line not in (None, table.layout.header_line):
-        problem, hint = "there is no header on this line", "lines count from 1"
-        raise MeasurementError(problem, file=opened.file, found=f"header_line = {header_line}", hint=hint)
+        raise MeasurementError(**ERRORS["no_such_line"], file=opened.file, found=f"header_line = {header_line}")
     if len(table.headers) < 2:
-        expected = f"{_EXPECTED_HEADER}, separated by comma, semicolon, tab, | or blanks"
-        hint = "if it was copied from a PDF cell by cell, copy it again as a table, or write each row on one line"
-        raise table.header_error("there is only one column", expected=expected, hint=hint)
+        raise table.header_error(**ERRORS["one_column"])
     if table.layout.headerless and not any(text.isdecimal() for text in columns.values()):
-        hint = f"state the numbers of the columns and their units in the campaign: {HINTS['numbers']}"
-        raise table.header_error("there is no known header", found=None, expected=_EXPECTED_HEADER, hint=hint)
+        raise table.header_error(**ERRORS["no_header"])
     table = classify(table, vocabulary, columns, stated_units)
     essential = ({"displacement", "force"}, *map(set, PAIRS))
     present = next((pair for pair in essential if pair <= set(table.roles)), {"displacement", "force"})
@@ -112,10 +106,13 @@ def _locate(
         located = opened.located[key] = []
         with error_location(opened.file):
             for source in opened.parts:
+                if (stated.header_line or 0) > MOST_HEAD_LINES // 2:
+                    source = source.after((stated.header_line or 0) - MOST_HEAD_LINES // 2)
                 mark = "" if isinstance(source, Sheet) else DELIMITERS.get(stated.delimiter or "")
                 layout = source.layout or find_layout(source.head, vocabulary, mark, stated.header_line)
                 if not stated.header_line and (long := reshape_table(source, layout, vocabulary)):
                     source, layout = long, find_layout(long.head, vocabulary, "")
+                    layout = replace(layout, notes=(*long.notes, *layout.notes))
                 located.append(((source, layout), combine_blocks(source, layout, vocabulary)))
     return opened.located[key]
 

@@ -89,9 +89,7 @@ def _from_json(node: Any) -> Any:
     """Convert a value of a JSON file to the form that scipy returns for MATLAB: dicts, lists of dicts, and arrays."""
     if isinstance(node, dict):
         fields = {name: _from_json(value) for name, value in node.items()}
-        return {
-            name: _named_channel(name, value) if isinstance(value, dict) else value for name, value in fields.items()
-        }
+        return {name: _as_channel(name, value) if isinstance(value, dict) else value for name, value in fields.items()}
     if not isinstance(node, list) or not all(isinstance(one, dict) for one in node):
         return np.array(node) if isinstance(node, list) else node
     if any(isinstance(value, list) for one in node for value in one.values()):
@@ -101,12 +99,11 @@ def _from_json(node: Any) -> Any:
     return {name: np.array([one.get(name, np.nan) for one in rows]) for name in names}
 
 
-def _named_channel(name: str, fields: dict[str, Any]) -> dict[str, Any]:
+def _as_channel(name: str, fields: dict[str, Any]) -> dict[str, Any]:
     """Form of a channel that an object with a unit and one list stands for; other objects are unchanged."""
     arrays = [value for value in fields.values() if isinstance(value, np.ndarray)]
-    return (
-        {"Data": arrays[0], "Name": name, "Unit": fields["unit"]} if len(arrays) == 1 and "unit" in fields else fields
-    )
+    is_channel = len(arrays) == 1 and "unit" in fields
+    return {"Data": arrays[0], "Name": name, "Unit": fields["unit"]} if is_channel else fields
 
 
 def _flat(row: dict[str, Any]) -> dict[str, Any]:

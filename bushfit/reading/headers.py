@@ -79,9 +79,7 @@ _DECIBELS = re.compile(r"(?:\s+in\s+|\s*/\s*|\s+)?[\[(]?\bdB\s*[\])]?\s*[\[(]?\s
 #: Symbol of a stiffness or modulus, in the spelling that `plain` returns: k', |k*|, g''.
 _SYMBOL = re.compile(r"\|?[a-z]{1,4}(?:\*|'{1,2})\|?|\|[a-z]\|")
 #: Words in a name whose symbol does not tell what the column is: a mean of K*, the imaginary part of K*.
-_UNLIKE_SYMBOL = frozenset(
-    plain_word for kind in ("not_measured", "real", "imaginary") for plain_word in WORDS["qualifiers"][kind]
-)
+_UNLIKE_SYMBOL = frozenset(word for kind in ("not_measured", "real", "imaginary") for word in WORDS["qualifiers"][kind])
 #: Symbol of a travel over its unit, which is no unit of seconds: "s / mm"; and quotation mark for two primes: G".
 _TRAVEL, _TWO_PRIMES = re.compile(r"s\s*/"), re.compile(r"(?<![^\W_])([A-Za-z])\"")
 #: Words that do not change the meaning of a channel.

@@ -20,7 +20,7 @@ import numpy as np
 
 from bushfit.errors import MeasurementError
 from bushfit.reading.formats import read_arrow, read_json, read_matlab, read_mdf, read_tdms
-from bushfit.reading.headers import HINTS, LOOP_COLUMNS, SWEEP_COLUMNS, Vocabulary
+from bushfit.reading.headers import ERRORS, HINTS, LOOP_COLUMNS, SWEEP_COLUMNS, Vocabulary
 from bushfit.reading.layout import Layout
 from bushfit.reading.lines import Line
 from bushfit.reading.source import Channel, Channels, Group, Sheet
@@ -28,9 +28,7 @@ from bushfit.reading.uff import read_uff
 from bushfit.reading.workbook import read_workbook
 
 #: Names of channels whose values cannot be complex.
-_REAL = Vocabulary(
-    {"time": LOOP_COLUMNS["time"], **{role: SWEEP_COLUMNS[role] for role in ("frequency", "amplitude")}}, {}
-)
+_REAL = Vocabulary({"time": LOOP_COLUMNS["time"], **{role: SWEEP_COLUMNS[role] for role in ("frequency", "amplitude")}})
 
 
 class Format(NamedTuple):
@@ -197,8 +195,7 @@ def _real_channels(channel: Channel, several: bool, is_record: bool) -> Iterator
         raise MeasurementError(
             f'the channel "{channel.name}" holds complex numbers',
             found=f"{values[np.argmax(values.imag != 0.0)]:.6g}",
-            expected="real numbers",
-            hint="export the real part of the channel, or leave the channel out",
+            **ERRORS["complex_channel"],
         )
     if values.dtype.kind == "c":
         yield channel._replace(values=np.abs(values))

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bushfit.caveat import Caveat
-from bushfit.reading.headers import SWEEP_COLUMNS, WORDS, Vocabulary, plain
+from bushfit.reading.headers import ERRORS, SWEEP_COLUMNS, WORDS, Vocabulary, plain
 from bushfit.reading.measurement import Floats
 from bushfit.reading.names import named_direction
 from bushfit.reading.runs import group_rows
@@ -158,8 +158,7 @@ def select_rows(table: Table, labels: Mapping[str, tuple[int, Sequence[str]]], w
         index = table.headers.index(header)
         chosen.append((index, next(column_texts(table, index)).per_row(), text))
     if wanted.shared and not chosen:
-        expected = "each file once, or a column that selects the rows of each test"
-        raise table.header_error("a file is listed twice", expected=expected)
+        raise table.header_error(**ERRORS["listed_twice"])
     column, parts = labels.get("specimen_number", (0, ()))
     total = len(parts or (chosen[0][1] if chosen else ()))
     selected = [n for n in range(total) if all(same_text(texts[n], text) for _, texts, text in chosen)]

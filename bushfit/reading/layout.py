@@ -50,7 +50,7 @@ _TYPES, _SEPARATORS = frozenset(map(plain, ("", *WORDS["rows_of"]["types"]))), r
 #: Blanks between a name and the bracket of its unit, which do not separate columns.
 _BLANK_BEFORE_BRACKET = re.compile(r" {1,8}(?=[\[(])")
 #: Wide gap, which is shortened to two blanks; and gap between columns whose headers contain single blanks.
-_WIDE_GAP, _COLUMN_GAP = re.compile(" {3,}"), re.compile(r"\t|\s{2,}")
+_WIDE_GAP, _COLUMN_GAP = re.compile(" {3,}"), re.compile(r" *\t *|\s{2,}")
 
 
 @dataclass(frozen=True, kw_only=True)

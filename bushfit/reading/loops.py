@@ -139,8 +139,7 @@ def time_column(table: Table, place: Place) -> Column:
         return si_column(table, "time", place)
     numbers = first_numbers(table, [time])
     if not has_known_name and numbers.size > 2 and np.all(np.diff(numbers[:, 0]) == 1.0):
-        hint = 'state sampling_rate = "... Hz" in the campaign, or the rate of the record, in place of this column'
-        raise table.error("this column counts the rows", column=time, expected="times", hint=hint)
+        raise table.error(**ERRORS["row_counter"], column=time)
     if time.unit:
         return si_column(table, "time", place)
     if np.min(numbers, initial=np.inf) > _SMALLEST_NANOSECONDS:

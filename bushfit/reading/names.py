@@ -75,7 +75,7 @@ _SAMPLING = {"sampling_rate": "Hz", "sampling_interval": "s"}
 _AMPLITUDES = [*SWEEP_COLUMNS["amplitude"], *STRAINING_COLUMNS["amplitude"]]
 _VOCABULARY = Vocabulary({"frequency": SWEEP_COLUMNS["frequency"], "amplitude": _AMPLITUDES})
 #: Separator between a name and its value above a table.
-_AFTER_KEY = re.compile(r"\t|;|:\s|:$|\s=\s|=|,(?!\d)|(?<=[^\W\d]),")
+_AFTER_KEY = re.compile(r"\t|;|:\s|:$|\s=\s|=|,(?!\d)|(?<=[^\W\d]),|(?<=[)\]]),")
 #: Blank between a name and its value at the end of a line: "Sample rate 512 Hz".
 _BEFORE_VALUE = re.compile(r"\s+(?=\d[\d.,]*(?:\s*[^\W\d]\S*)?$)")
 #: Name and value with unit in a line: "1 V = 200 N", "Crosshead speed: 10 mm/min".
@@ -236,7 +236,7 @@ def labels_above(lines: Iterable[Line]) -> Labels:
     lines = list(lines)
     conventions = {found for line in lines if (found := _convention_in_line(line))}
     convention = conventions.pop() if len(conventions) == 1 else None
-    rows = map(_name_and_values, lines)
+    rows = map(name_and_values, lines)
     x_units = (row[1] for row in rows if len(row) > 1 and plain(row[0]) in X_UNIT_NAMES)
     x_unit = next(filter(units.is_unit, x_units), "s")
     parts = [Line(line.number, part) for line in lines for part in (line.content, *_PARTS_OF_LINE.split(line.text))]
@@ -271,8 +271,12 @@ def names_coupon(text: str) -> bool:
     return _COUPON.search(folded(text)) is not None
 
 
-def _name_and_values(line: Line) -> list[str]:
-    """Cells of a line of text or row of a sheet: a name, then its values; one cell without a value."""
+def name_and_values(line: Line) -> list[str]:
+    """Split a line of text or row of a sheet into a name and its values.
+
+    Returns:
+        Texts of the name and of each value; one text if the line has no value.
+    """
     if isinstance(line.content, str):
         cells = _AFTER_KEY.split(line.content.lstrip("#%/; "))
     else:
@@ -292,7 +296,7 @@ def _label_in_line(line: Line, x_unit: str) -> Labels:
         line: line of text or row of a sheet.
         x_unit: unit of the step between rows, such as dx, if the line states none.
     """
-    cells = _name_and_values(line)
+    cells = name_and_values(line)
     if len(cells) < 2 or len(cells[0]) > _LONGEST_VALUE:
         return NO_LABELS
     (name, unit), heading = units.split_header(cells[0]), _VOCABULARY.heading(cells[0])

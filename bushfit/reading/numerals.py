@@ -14,7 +14,7 @@ from functools import cached_property, lru_cache
 from itertools import islice, product
 from typing import TYPE_CHECKING, NamedTuple
 
-from bushfit.reading.headers import HINTS
+from bushfit.reading.headers import ERRORS
 from bushfit.units import SUPERSCRIPTS
 
 if TYPE_CHECKING:
@@ -229,17 +229,13 @@ def find_numerals(table: Table) -> Numerals:
     if evidence.question is None:
         return usual
     (line, index), text = evidence.question
+    kind, found = "two_readings", f'"{text}", and no other number in the file shows the decimal mark'
+    expected = " or ".join(dict.fromkeys(f"{way.value(text) or 0.0:.15g}" for way in evidence.ways))
     if evidence.is_contrary:
-        problem, found = "this number has another format than the others", f'"{text}"'
+        kind, found = "other_format", f'"{text}"'
         expected = f"numbers with a decimal {'comma' if usual.decimal == ',' else 'point'}"
-        hint = HINTS["decimal"]
-    else:
-        problem = "this number can be read in two ways"
-        found = f'"{text}", and no other number in the file shows the decimal mark'
-        expected = " or ".join(dict.fromkeys(f"{way.value(text) or 0.0:.15g}" for way in evidence.ways))
-        hint = 'state decimal = "." or decimal = "," in the campaign'
     column = next(column for column in table.roles.values() if column.index == index)
-    raise table.error(problem, line=line, column=column, found=found, expected=expected, hint=hint)
+    raise table.error(**ERRORS[kind], line=line, column=column, found=found, expected=expected)
 
 
 def _possible_numerals(table: Table) -> tuple[Numerals, ...]:

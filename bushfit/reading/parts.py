@@ -9,7 +9,7 @@ from typing import Any
 
 from bushfit.errors import MeasurementError, did_you_mean
 from bushfit.reading.files import join_quoted, sha256, to_utf8, unpack_gzip, view_bytes
-from bushfit.reading.headers import WORDS
+from bushfit.reading.headers import ERRORS, WORDS
 from bushfit.reading.instruments import format_of, read_parts, word_for_part
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.source import RowSource, Sheet, Text
@@ -73,8 +73,7 @@ def open_file(file: Path, file_format: FileFormat) -> OpenedFile:
     recording = format_of(data)
     parts = read_parts(data, file, recording) if recording else ()
     if not parts and name:
-        expected = "a workbook, or a file with groups of channels"
-        raise MeasurementError("this is not a workbook", file=file, found=f'sheet = "{name}"', expected=expected)
+        raise MeasurementError(**ERRORS["not_a_workbook"], file=file, found=f'sheet = "{name}"')
     if not parts:
         text, encoding = to_utf8(data, file, file_format.encoding)
         head = text[:_FIRST_BYTES].decode("utf-8", "replace")

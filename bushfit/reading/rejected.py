@@ -11,10 +11,21 @@ import numpy as np
 from bushfit import units
 from bushfit.caveat import Caveat
 from bushfit.errors import MeasurementError, UnitError
-from bushfit.reading.headers import ROLE_SETS, WORDS, Column, Vocabulary, parse_unit, plain, split_unit
+from bushfit.reading.headers import (
+    ALL_COLUMNS,
+    ERRORS,
+    ROLE_SETS,
+    WORDS,
+    Column,
+    Vocabulary,
+    parse_unit,
+    plain,
+    split_unit,
+)
 from bushfit.reading.lines import is_row, is_summary_row
 from bushfit.reading.measurement import Floats
 from bushfit.reading.numerals import is_like_number
+from bushfit.reading.roles import is_test
 from bushfit.reading.source import LEAST_VALUE, Sheet
 from bushfit.reading.times import parse_clock
 
@@ -78,6 +89,18 @@ def begins_other_table(cells: Sequence[str]) -> bool:
     return len(filled) > 1 and len(in_brackets) > 0 and not any(map(is_like_number, filled))
 
 
+def find_other_tables(table: Table) -> list[tuple[int, str]]:
+    """Find the headers of other tests below a table, such as a sweep below a loop.
+
+    Returns:
+        Line number and names of the columns of each header.
+    """
+    vocabulary, rows = Vocabulary(ALL_COLUMNS), () if table.source.is_one_block(table.layout) else table.all_rows()
+    headers = ((line, [str(cell) for cell in cells if cell != ""]) for line, cells, fault in rows if fault == "other")
+    tests = ((line, texts) for line, texts in headers if is_test(vocabulary.roles(texts)))
+    return [(line, ", ".join(texts)) for line, texts in tests if not table.layout.is_header(texts, vocabulary)]
+
+
 def note_left_out(table: Table, rows: Sequence[FaultyRow], count: int) -> Iterator[Caveat]:
     """Warning on rows that are left out because they are not data, except repeated headers and rows of units.
 
@@ -86,7 +109,7 @@ def note_left_out(table: Table, rows: Sequence[FaultyRow], count: int) -> Iterat
         count: number of rows of data.
 
     Yields:
-        One warning if there are such rows.
+        A warning on each other table, and one on other rows.
 
     Raises:
         MeasurementError: so many of these rows look like data that the meaning of the table is in doubt.
@@ -99,7 +122,11 @@ def note_left_out(table: Table, rows: Sequence[FaultyRow], count: int) -> Iterat
     are_between_samples = len(empty) == 1 and any(*empty) and complete.size > 2 and np.ptp(np.diff(complete)) == 0
     if is_much and len(in_doubt) > _MOST_LEFT_OUT * count and not are_between_samples:
         raise bad_row(table, *in_doubt[0][:2], len(in_doubt))
-    if left_out:
+    below = table.other_tables if any(fault == "other" for *_, fault in left_out) else ()
+    for line, names in below:
+        sentence = f"line {line} begins another table ({names}): header_line = {line} in the campaign reads it"
+        yield Caveat("other_table", sentence)
+    if left_out := [row for row in left_out if not below or row[0] < below[0][0]]:
         listed = [
             f"{'row' if isinstance(table.source, Sheet) else 'line'} {line} "
             f"({', '.join(str(cell) for cell in cells if cell != '')[:40]})"
@@ -139,9 +166,7 @@ def bad_row(
         return lost
     if count > 1 and filled <= column.index and next(table.rows(), None) is None:
         found, expected = f"{filled} cells", f"{len(table.headers)} cells: {', '.join(table.headers)}"
-        hint = "add the column that is missing, or delete its name and unit from the file"
-        problem = "all rows have fewer cells than the header"
-        return table.error(problem, line=line, found=found, expected=expected, hint=hint)
+        return table.error(**ERRORS["fewer_cells"], line=line, found=found, expected=expected)
     problem = "the cell is empty" if cell == "" else "this is not a finite number, or beyond the range of every rig"
     advice = "write each row on one line; tables copied from a PDF often have broken rows" if cell == "" else None
     expected = f"a number such as 12{table.numerals.decimal}5"
@@ -152,8 +177,7 @@ def lost_formulas(table: Table) -> MeasurementError | None:
     """Return the error for a workbook whose formulas have no saved values; None for any other table."""
     if not (isinstance(table.source, Sheet) and table.source.lacks_values()):
         return None
-    hint = "open it in a spreadsheet program and save it again"
-    return table.error("the workbook has formulas whose values were not saved", hint=hint)
+    return table.error(**ERRORS["lost_formulas"])
 
 
 def check_positive(table: Table, wanted: Mapping[str, Column], values: Mapping[str, Floats]) -> None:
@@ -226,11 +250,9 @@ def refuse_other_columns(table: Table, left_out: Iterable[FaultyRow], vocabulary
             heading = vocabulary.heading(text)
             is_same = plain(name) == plain(split_unit(column.header)[0]) or (heading and heading.role == column.role)
             if is_header and not is_same:
-                problem = "a header repeats the columns in another order"
                 found = ", ".join(filter(None, texts))
                 expected = f"the columns of line {table.layout.header_line}: {', '.join(table.headers)}"
-                hint = "write all blocks with the same columns, or each block to a separate file"
-                raise table.error(problem, line=line, found=found, expected=expected, hint=hint)
+                raise table.error(**ERRORS["other_order"], line=line, found=found, expected=expected)
             if not (unit and column.unit) or unit == "-" or is_like_number(unit):
                 continue
             scales = [units.kelvin_scale(one) for one in (unit, column.unit)]
@@ -246,6 +268,5 @@ def refuse_other_columns(table: Table, left_out: Iterable[FaultyRow], vocabulary
                 place=table.place(line, different[0]),
                 found=f"{', '.join(texts[column.index] for column in different)} on line {line}, "
                 f"{', '.join(str(column.unit) for column in different)} on line {first}",
-                expected="the same units in all blocks of a file",
-                hint="convert all blocks to the same units, or write each block to a separate file",
+                **ERRORS["two_units"],
             )

@@ -15,12 +15,14 @@ from typing import NamedTuple
 import numpy as np
 
 from bushfit import units
+from bushfit.caveat import Caveat
 from bushfit.errors import MeasurementError
 from bushfit.reading.blocks import find_segments
-from bushfit.reading.headers import WORDS, Vocabulary, plain
+from bushfit.reading.headers import ERRORS, WORDS, Vocabulary, plain
 from bushfit.reading.layout import Layout
-from bushfit.reading.lines import Line, is_row
+from bushfit.reading.lines import WITH_UNIT, Line, is_row
 from bushfit.reading.measurement import FEWEST_LOOP_ROWS
+from bushfit.reading.names import name_and_values
 from bushfit.reading.numerals import is_like_number, plainest_value
 from bushfit.reading.roles import UNIT_NAMES, is_test
 from bushfit.reading.source import Channels, RowSource, Sheet, cells_of
@@ -35,7 +37,7 @@ _PAIR = re.compile(
     r"([+-]?\d(?:[\d.,eE+-]*\d)?(?:\s?[^\s\d=,;][^\s=,;]*(?![^\s,;]))?)"
 )
 #: Relative difference up to which two curves of a picture have the same x; chosen: clicks are less exact than tables.
-_SAME_X = 0.01
+_SAME_X = 0.03
 #: First rows that show whether a column names quantities; chosen: more than a test has channels.
 _FIRST_ROWS = 50
 
@@ -72,32 +74,62 @@ def reshape_table(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> 
 
 
 def _spread_pairs(source: RowSource, vocabulary: Vocabulary) -> Sheet | None:
-    """Make a row of each line of a log with the same names, such as "f=5.0 Hz A=0.1 mm", with a column for each."""
-    found = [_PAIR.findall(line.text) for line in source.head]
-    (names, count), *_ = Counter(tuple(name for name, _ in pairs) for pairs in found).most_common(1)
-    if 2 * count <= len(found) or not is_test(vocabulary.roles(names)):
+    """Make a table of results with their names, on one line ("f=5.0 Hz A=0.1 mm") or on one line each ("f: 5 Hz").
+
+    A name that occurs again begins the next row.
+    """
+    head = [_named_numbers(line) for line in source.head]
+    names = list(dict.fromkeys(name for pairs in head for name, _ in pairs))
+    if 2 * sum(map(bool, head)) < len(head) or not is_test(vocabulary.roles(names)):
         return None
-    above = [[line.text] for line, pairs in zip(source.head, found, strict=True) if len(pairs) < 2]
-    rows = [[text for _, text in _PAIR.findall(line.text)] for line in source.lines(0)]
-    return Sheet(source.sheet or "", [*above, names, *(row for row in rows if len(row) == len(names))])
+    above, rows = list[Sequence[str]](), list[dict[str, str]]()
+    for line in source.lines(0):
+        pairs = _named_numbers(line)
+        above += [] if pairs or rows else [[line.text]]
+        for name, text in pairs:
+            if not rows or name in rows[-1]:
+                rows.append({})
+            rows[-1][name] = text
+    return Sheet(source.sheet or "", [*above, names, *([row.get(name, "") for name in names] for row in rows)])
+
+
+def _named_numbers(line: Line) -> list[tuple[str, str]]:
+    """Name and number, with its unit if any, of each result in a line."""
+    if len(pairs := _PAIR.findall(line.text)) > 1:
+        return pairs
+    name, *values = name_and_values(line) or [""]
+    text = " ".join(values[:2])
+    is_number = WITH_UNIT.fullmatch(text) or (len(values) == 1 and is_like_number(text))
+    return [(name, text)] * bool(name[:1].isalpha() and is_number)
 
 
 def _name_curves(source: RowSource, layout: Layout) -> Sheet | None:
     """Name the curves of a digitized picture, whose names stand above their columns X and Y, and keep one column X.
 
+    Curves with x values of their own are interpolated linearly over ln x, at those of the first curve within the range
+    of all.
+
     Raises:
-        MeasurementError: the curves have different x values.
+        MeasurementError: the curves have different x values, which do not increase from a value above zero.
     """
     names, axes = ([*map(str, cells_of(line, layout.delimiter)), ""] for line in (*source.head, *source.head)[:2])
     if len(axes) < 5 or [plain(axis) for axis in axes[:-1]] != ["x", "y"] * (len(axes) // 2):
         return None
-    rows = [list(map(str, cells_of(line, layout.delimiter))) for line in source.lines(source.head[1].number)]
-    curves = [[plainest_value(row[n]) for row in rows if len(row) > n] for n in range(0, len(axes) - 1, 2)]
-    if not all(len(x) == len(curves[0]) and np.allclose(x, curves[0], rtol=_SAME_X) for x in curves):
-        problem, expected = "each curve of this file has its own x values", "the same x values in all curves"
-        hint = "interpolate the curves at common x values, and write a table with a column for each"
-        raise MeasurementError(problem, found=", ".join(filter(None, names)), expected=expected, hint=hint)
-    return Sheet("", [["X", *names[:-1:2]], *([row[0], *row[1::2]] for row in rows)])
+    names, below = names[:-1:2], source.lines(source.head[1].number)
+    rows = [[*map(str, cells_of(line, layout.delimiter)), *axes][: len(axes) - 1] for line in below]
+    cells = [[row[n : n + 2] for row in rows if plain(row[n]) not in ("", "x")] for n in range(0, len(axes) - 1, 2)]
+    curves = [np.array([[plainest_value(cell) for cell in pair] for pair in pairs]).reshape(-1, 2).T for pairs in cells]
+    x, notes = curves[0][0], tuple[Caveat, ...]()
+    if not all(len(curve[0]) == len(x) and np.allclose(curve[0], x, rtol=_SAME_X) for curve in curves):
+        if not all(curve.size and curve[0, 0] > 0.0 and (np.diff(curve[0]) > 0.0).all() for curve in curves):
+            raise MeasurementError(**ERRORS["other_x"], found=", ".join(names))
+        low, high = max(curve[0, 0] for curve in curves), min(curve[0, -1] for curve in curves)
+        x = x[(x > (1.0 - _SAME_X) * low) & (x < (1.0 + _SAME_X) * high)]
+        curves = [np.array([x, np.interp(np.log(x), np.log(curve[0]), curve[1])]) for curve in curves]
+        sentence = f'the curves have x values of their own: they are interpolated at those of "{names[0]}"'
+        notes = (Caveat("resampled", sentence),)
+    rows_of_curves = np.column_stack([x, *(curve[1] for curve in curves)]).tolist()
+    return Sheet("", [["X", *names], *rows_of_curves], notes=notes)
 
 
 def _spread_names(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> Sheet | None:

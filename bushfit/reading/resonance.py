@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from bushfit.geometry import Place
-from bushfit.reading.headers import RESONANCE_COLUMNS, WORDS, ZERO_TO_PEAK, Column
+from bushfit.reading.headers import ERRORS, RESONANCE_COLUMNS, WORDS, ZERO_TO_PEAK, Column
 from bushfit.reading.measurement import Complex, Floats, Source
 from bushfit.reading.rejected import check_positive
 from bushfit.reading.si_columns import si_column
@@ -85,12 +85,7 @@ def _resonance_columns(table: Table, place: Place, *, has_stated_base: bool) -> 
     """
     columns = next((columns for columns in _COLUMN_SETS if set(columns) <= set(table.roles)), None)
     if columns is None:
-        alternatives = ", or ".join(" and ".join(columns) for columns in _COLUMN_SETS).replace("_", " ")
-        raise table.header_error(
-            "the columns give no complex transmissibility",
-            expected=f"frequency, and {alternatives}",
-            hint='correct the header, or name the column: --column "mass_acceleration=..."',
-        )
+        raise table.header_error(**ERRORS["no_transmissibility"])
     has_base = any(role.startswith("base") for role in columns) or "base_acceleration" in table.roles
     if has_base == has_stated_base:
         problem, found, expected = "stated twice", "a column, and --base-acceleration", "one of them"

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 #: Number above zero of a stated multiple of a unit, such as 200 N for the force of 1 V.
 _MULTIPLE = re.compile(r"^(?=[\d.]*[1-9])\d+\.?\d*(?=\s+[^\W\d_])")
 #: Letter of an axis in the name of a force: "Fx", "F_z 1", "Load Y".
-_AXIS = re.compile(r"(?:^|[\W_])[A-Z]?_?([XYZ])(?![^\W\d_])", re.IGNORECASE)
+_AXIS = re.compile(r"(?:^|[\W_])[a-z]?_?([xyz])(?![^\W\d_])")
 #: Starts of the names of an angular frequency.
 _ANGULAR = ("angular", "angfreq", "omega", "ω", "kreisfrequenz", "pulsa", "角频率")
 #: Start of the name of a logarithm, in the spelling that `plain` returns.
@@ -80,10 +80,11 @@ def si_column(table: Table, role: str, tested: Place, hint: str | None = None) -
     if column is None:
         refuse_other_motion(table, role)
         ways = ", ".join(filter(None, (columns_key(table, role, expected), hint)))
+        below = (f"; line {n} begins another table, which header_line = {n} reads" for n, _ in table.other_tables)
         raise table.header_error(
             f"there is no column for the {label}",
             expected=f'a header such as "{label} [{example}]"',
-            hint=f"state in the campaign {ways}",
+            hint=f"state in the campaign {ways}{''.join(below)}",
         )
     column = replace(column, role=name)
     if column.index in table.clocks:
@@ -164,10 +165,9 @@ def choose_column(role: str, headers: Sequence[str]) -> str:
     Returns:
         Keys such as 'columns = { force = "F1" } or columns = { force = "F2" }'.
     """
-    by_axis = dict[object, list[str]]()
+    by_axis = dict[tuple[str | None, ...], list[str]]()
     for header in headers if role == "force" else ():
-        letter = _AXIS.search(header)
-        by_axis.setdefault(named_direction([header]) or (letter and letter[1].lower()), []).append(header)
+        by_axis.setdefault((named_direction([header]), *_AXIS.findall(header.lower())), []).append(header)
     alone, sums = (
         " or ".join(f'columns = {{ {role} = "{text}" }}' for text in texts)
         for texts in (headers[:3], [" + ".join(group) for group in by_axis.values() if len(group) > 1])

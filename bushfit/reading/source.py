@@ -6,13 +6,14 @@ import io
 import re
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import islice
 from typing import Any, NamedTuple
 
 from numpy.typing import NDArray
 
+from bushfit.caveat import Caveat
 from bushfit.errors import MeasurementError
 from bushfit.reading.files import CHUNK_BYTES, HEAD_BYTES
 from bushfit.reading.layout import MOST_HEAD_LINES, Layout
@@ -26,6 +27,11 @@ LEAST_VALUE, LARGEST_VALUE = SIZES[0], 1e19
 _LINE_END = re.compile(rb"\r\n|\n|\r")
 #: Bytes, or rows, at the end of a file that are searched for notes; chosen: room for a paragraph.
 _TAIL_BYTES, _TAIL_ROWS = 2048, 20
+#: Largest text, in bytes, and sheet, in rows, that is searched for blocks without their own headers; chosen: both have
+#: some 100,000 rows.
+_MOST_BYTES, _MOST_ROWS = 1 << 22, 100_000
+#: Bytes that occur in rows of numbers, which cannot begin a block.
+_NUMERIC = b"0123456789.,+-eEdD \t\r\n"
 #: Rows of channels that are converted at a time; chosen: they take a few MiB.
 _CHUNK_ROWS = 1 << 14
 #: Thousands separated by a blank.
@@ -54,7 +60,7 @@ class Text:
     @cached_property
     def head(self) -> list[Line]:
         """First non-empty lines of the text, which can contain the header."""
-        return list(islice(_non_empty_lines(io.BytesIO(self.data[:HEAD_BYTES]), 0), MOST_HEAD_LINES))
+        return list(islice(_non_empty_lines(io.BytesIO(self.data[:HEAD_BYTES]), self.before), MOST_HEAD_LINES))
 
     def lines(self, after: int) -> Iterator[Line]:
         """Yield the non-empty lines of the text below the line of the file with number `after`."""
@@ -80,6 +86,18 @@ class Text:
             chunk = Text(self.data[start:end], self.encoding, after)
             yield chunk
             start, after = end, after + chunk.data.count(b"\n")
+
+    def after(self, line: int) -> Text:
+        """Return the text below the line of the file with number `line`."""
+        return Text(self.data[self.offset(line) :], self.encoding, max(line, self.before))
+
+    def is_one_block(self, layout: Layout) -> bool:
+        """Return True if the bytes of the text rule out a second block or another table below the header."""
+        start, end = self.offset(layout.header_line - 1), self.offset(layout.lines_before_data)
+        if len(self.data) > _MOST_BYTES:
+            header = self.data[start : self.offset(layout.header_line)].strip()
+            return self.data.find(header, start + len(header)) < 0
+        return not self.data[end:].translate(None, _NUMERIC + layout.delimiter.encode())
 
     def may_contain(self, sign: str, layout: Layout) -> bool:
         """Return True if cells below the header can contain a decimal mark or thousands separator."""
@@ -175,6 +193,7 @@ class Sheet:
         hidden: numbers of the rows that the workbook hides.
         divided: number of cells that a number format shows divided by a power of 1000, as they are read.
         is_visible: False for a hidden sheet of a workbook.
+        notes: warnings on how the rows were rearranged.
     """
 
     sheet: str
@@ -188,6 +207,15 @@ class Sheet:
     hidden: Sequence[int] = ()
     divided: int = 0
     is_visible: bool = True
+    notes: tuple[Caveat, ...] = ()
+
+    def after(self, line: int) -> Sheet:
+        """Return a copy of the sheet whose first rows, up to the one with number `line`, are empty."""
+        return replace(self, content=[*[()] * line, *self.content[line:]])
+
+    def is_one_block(self, _layout: Layout) -> bool:
+        """Return True if the sheet is too long to be searched for other tables, or has channels instead of rows."""
+        return not 0 < len(self.content) <= _MOST_ROWS
 
     def may_contain(self, _sign: str, _layout: Layout) -> bool:
         """Return True: cells of a sheet may contain any sign."""

@@ -11,7 +11,7 @@ from pydantic import BeforeValidator, Field, ValidationInfo
 from bushfit.caveat import Caveat
 from bushfit.errors import CampaignError, error_location
 from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Direction, Place, Specimen
-from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS, AmplitudeConvention
+from bushfit.reading.headers import ERRORS, LOOP_COLUMNS, SWEEP_COLUMNS, AmplitudeConvention
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.measurement import Floats, Source, Stepped, Waveform, rebuild_time
 from bushfit.reading.preload import parse_preload
@@ -96,8 +96,7 @@ def place_tested(test: Mapping[str, object], specimens: Sequence[Specimen]) -> P
             expected="one of " + ", ".join(by_name) if by_name else "a [[specimens]] table with this name",
         )
     if direction not in (None, "shear"):
-        expected = 'direction = "shear", or none: a specimen is tested in one way only'
-        raise CampaignError("a specimen has no such direction", found=str(direction), expected=expected)
+        raise CampaignError(**ERRORS["direction_of_specimen"], found=str(direction))
     return by_name[specimen]
 
 
@@ -238,10 +237,8 @@ class LoopFile(TestFile):
         is_incomplete = (self.frequency is None) != (self.waveform is None)
         if is_incomplete or sum(map(bool, (self.sampling_rate, self.rate, self.frequency))) > 1:
             keys = [key for key in ("sampling_rate", "rate", "frequency", "waveform") if getattr(self, key)]
-            expected = 'sampling_rate, or rate, or frequency and waveform ("sine" or "triangle") together'
             hint = 'state waveform = "sine" and frequency together' if self.frequency and is_incomplete else None
-            problem = "these keys do not determine the time of a loop"
-            raise ValueError(CampaignError(problem, found=", ".join(keys), expected=expected, hint=hint))
+            raise ValueError(CampaignError(**ERRORS["no_time"], found=", ".join(keys), hint=hint))
 
     @property
     def states_time(self) -> bool:

@@ -45,12 +45,7 @@ def stiffness_pair(table: Table) -> tuple[str, str]:
     for role in {role: None for pair in PAIRS for role in pair if role in OF_MOTION}:
         refuse_other_motion(table, role)
     refuse_ambiguous_damping(table)
-    usual = ", or ".join(" and ".join(pair) for pair in AGREEING_PAIRS).replace("_", " ")
-    raise table.header_error(
-        "no pair of columns gives a complex stiffness",
-        expected=f"{usual}, or a force amplitude and its phase",
-        hint='correct the header, or name the columns in the campaign: columns = { stiffness = "..." }',
-    )
+    raise table.header_error(**ERRORS["no_stiffness"])
 
 
 def refuse_ambiguous_damping(table: Table) -> None:

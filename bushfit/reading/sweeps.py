@@ -6,6 +6,7 @@ import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,7 @@ from bushfit.caveat import Caveat
 from bushfit.geometry import Place, strain_factor_of_files
 from bushfit.reading.block_labels import note_coupon
 from bushfit.reading.finding import find_table
-from bushfit.reading.headers import HINTS, SWEEP_COLUMNS, WORDS, ZERO_TO_PEAK, AmplitudeConvention, Column
+from bushfit.reading.headers import ERRORS, HINTS, SWEEP_COLUMNS, WORDS, ZERO_TO_PEAK, AmplitudeConvention, Column
 from bushfit.reading.labelled import Rows, column_texts, note_not_understood
 from bushfit.reading.levels import rows_of_test
 from bushfit.reading.measurement import Complex, Floats, Sweep
@@ -177,23 +178,20 @@ def sweep_columns(
     wanted += [role for role in redundant if table.agrees(role, si_unit(role, direction.motion))]
     columns = {role: si_column(table, role, direction, HINTS.get(role)) for role in wanted}
     amplitude, force = columns.get("amplitude"), columns.get("force_amplitude")
-    in_header, expected, problem = amplitude.convention if amplitude else None, "p-p, rms or 0-p in the header", ""
+    in_header, error = amplitude.convention if amplitude else None, dict[str, Any]()
     used = in_header or convention or "zero-to-peak"
     if in_header and convention and in_header != convention:
-        problem, expected = "header and campaign state different conventions for the amplitudes", "one convention"
         found = f'{in_header} in the header, amplitude = "{convention}" in the campaign'
-        hint = "correct one of them; what the header states needs no key in the campaign"
+        error = {**ERRORS["two_conventions"], "found": found}
     elif amplitude and not (in_header or convention) and _STROKE.match(amplitude.header):
-        problem, found = "this amplitude may be a stroke, which is peak-to-peak", f'"{amplitude.header}"'
-        hint = 'amplitude = "peak-to-peak" in the campaign, or amplitude = "zero-to-peak" if it is half the stroke'
+        error = {**ERRORS["stroke"], "found": f'"{amplitude.header}"'}
     elif force and not force.convention and used != "zero-to-peak":
-        problem = "the header does not state the convention of the force amplitudes"
         found = f'"{force.header}" beside a displacement that is {used}'
         forms = ("p-p" if used == "peak-to-peak" else "rms", "0-p")
         units = " or ".join(f'units = {{ force_amplitude = "{force.unit} {form}" }}' for form in forms)
-        hint = f"{units} in the campaign"
-    if problem:
-        raise table.header_error(problem, found=found, expected=expected, hint=hint)
+        error = {**ERRORS["no_convention"], "found": found, "hint": f"{units} in the campaign"}
+    if error:
+        raise table.header_error(**error)
     for role in ("amplitude", "amplitude_reached", "force_amplitude"):
         if column := columns.get(role):
             columns[role] = replace(column, scale=ZERO_TO_PEAK[column.convention or used] * column.scale)

@@ -28,6 +28,7 @@ from bushfit.reading.rejected import (
     FaultyRow,
     bad_row,
     begins_other_table,
+    find_other_tables,
     lost_formulas,
     mark_missing,
     note_left_out,
@@ -91,6 +92,8 @@ class Table:
     lines_above = cached_property(find_lines_above)
     #: Warnings on lines above the table, marked rows and hidden rows that may change what the test means.
     remarks = cached_property(find_remarks)
+    #: Headers of other tests below the table: line number and names of the columns.
+    other_tables = cached_property(find_other_tables)
 
     @cached_property
     def labels_above(self) -> Labels:

@@ -19,7 +19,7 @@ from bushfit import units
 from bushfit.caveat import Caveat
 from bushfit.errors import MeasurementError
 from bushfit.reading.blocks import find_segments
-from bushfit.reading.headers import COUNTED, AmplitudeConvention, Vocabulary, split_convention
+from bushfit.reading.headers import COUNTED, ERRORS, AmplitudeConvention, Vocabulary, split_convention
 from bushfit.reading.layout import Layout
 from bushfit.reading.lines import Line, is_comment, is_row, is_summary_row, is_units_row
 from bushfit.reading.names import named_direction
@@ -283,17 +283,11 @@ def _long_table(
         for meanings in zip(*((column.down, column.meaning) for column in columns), strict=True)
     ]
     if not is_named or any(len(axis) > 1 for axis in axes):
-        problem, expected = "this wide table states its levels in two ways", "one unit for each of them"
-        if not is_named:
-            problem = "the quantity of a block of this wide table is not stated"
-            expected = "a quantity such as K* [N/mm] or tan delta above each block, or in each header"
         raise MeasurementError(
-            problem,
+            **ERRORS["two_levels" if is_named else "no_quantity"],
             file=file,
             place=f'sheet "{source.sheet}"' if source.sheet else f"line {columns[0].points[0][0] - 1}",
             found=", ".join(dict.fromkeys(filter(None, texts))),
-            expected=expected,
-            hint="correct the wide table, or write a long table with one row for each frequency and amplitude",
         )
 
     several, rows = len({column.direction for column in columns}) > 1, list[KeyedValue]()

@@ -112,9 +112,7 @@ def _xml_of_sheets(data: bytes) -> tuple[dict[str, bytes], dict[str, tuple[float
     custom = {one.get("numFmtId", ""): str(one.get("formatCode")) for one in styles if one.tag.endswith("}numFmt")}
     cell_styles = next((list(one) for one in styles if one.tag.endswith("}cellXfs")), [])
     formats = [{**_PERCENTAGES, **custom}.get(style.get("numFmtId", ""), "") for style in cell_styles]
-    meanings = {
-        str(style): meaning for style, code in enumerate(formats) if (meaning := _factor_and_unit(code)) != (1.0, "")
-    }
+    meanings = {str(n): meaning for n, code in enumerate(formats) if (meaning := _factor_and_unit(code)) != (1.0, "")}
     return {name: contents.get(f"xl/{target}", b"") for name, target in sheets.items()}, meanings
 
 
