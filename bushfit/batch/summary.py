@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -50,6 +50,8 @@ _CURVE = "measured stiffness"
 #: Kinds of warnings on a misfit whose cause a diagnosis may find, and on points outside the tested range.
 _MISFITS = {"misfit", "model_error", "unfitted_test_missed"}
 _EXTRAPOLATIONS = {"extrapolated_frequency", "extrapolated_strain", "extrapolated_rate", "extrapolated_stroke"}
+#: Number of equal digits of all parameters and measures of two fits that shows the same data; two parts never agree.
+_SAME_DIGITS = 5
 #: Maximum number of names in a sentence.
 _NAMES_LISTED = 10
 
@@ -297,6 +299,13 @@ class BatchResult:
         elif missing:
             sentence = f"the tests of {listed(missing)} deviate from the model by more than noise explains"
             warnings.append(Caveat("part_misfit", f"{sentence}: --command diagnose looks for the cause"))
+        fits = [rows[0] for name, rows in self.estimates.items() if name in FIT_NAMES or is_parameter(name)]
+        equal_parts = defaultdict[tuple[str, ...], list[str]](list)
+        for part, record, values in zip(parts, self.records, np.reshape(fits, (-1, len(parts))).T, strict=True):
+            if record.status == "done":
+                equal_parts[tuple(number(value, _SAME_DIGITS) for value in values)].append(part.name)
+        for names in (names for names in equal_parts.values() if len(names) > 1):
+            warnings.append(Caveat("same_parts", f"the tests of {listed(names)} have the same data: check their files"))
         if lacking := [part.name for part, lacks in zip(parts, self.lacks_sweep, strict=True) if lacks]:
             sentence = f"not compared with the other parts, because a sweep is missing: {listed(lacking)}"
             warnings.append(Caveat("part_without_sweep", sentence))

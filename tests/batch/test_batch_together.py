@@ -92,7 +92,7 @@ def test_a_soft_part_of_ten_is_named():
     assert not find_outliers({"0": (values[0], np.where(np.arange(10) == 6, 9.0, 0.1))})[1]["0"].any(), "a large error"
 
 
-def test_a_part_without_the_sweep_of_the_others_is_named_and_not_compared():
+def test_parts_with_the_same_data_or_without_the_sweep_of_the_others_are_named():
     curve = {f"axial {frequency} Hz 0.1 mm": 5e5 for frequency in (5, 25, 100)}
     whole = RowFile(status="done", quantities={"mu": Estimate(1e6)}, curve=curve)
     records = [*[whole] * 6, replace(whole, curve={})]
@@ -100,7 +100,8 @@ def test_a_part_without_the_sweep_of_the_others_is_named_and_not_compared():
     result = BatchResult(plan, records, 0, 0.0, ())
     assert np.flatnonzero(np.isnan(result.compared_values["mu"][0])).tolist() == [6]
     parts: Any = [SimpleNamespace(name=f"P{number}", poor_fit="", warning_kinds=()) for number in range(7)]
-    assert [*map(str, result.warnings(parts))] == ["not compared with the other parts, because a sweep is missing: P6"]
+    assert [warning.kind for warning in result.warnings(parts)] == ["same_parts", "part_without_sweep"]
+    assert str(result.warnings(parts)[1]) == "not compared with the other parts, because a sweep is missing: P6"
 
 
 @pytest.mark.parametrize(("count", "level"), [(1, 0.1), (2, 0.1), (3, 0.2), (4, 0.2)])
