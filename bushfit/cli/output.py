@@ -75,7 +75,7 @@ class _Console(Console):
             self.width = _WIDTH
 
     def print(self, *objects: Any, **options: Any) -> None:
-        """Print objects of rich; a text that cannot be written, as to a full disk, is an error at the end only."""
+        """Print objects of rich; an error of writing, such as a full disk, is reported only when the command ends."""
         with suppress(OutputError):
             super().print(*objects, **options)
 
@@ -135,10 +135,15 @@ class Output:
         return folder
 
     @staticmethod
-    def command(words: str, name: str) -> str:
-        """Command that runs as printed: with --force if its default folder, for a result of this name, exists."""
-        folder = Path("results", folder_name(name), words.split()[0])
-        return f"bushfit {words}{' --force' * folder.exists()}"
+    def command(arguments: str, name: str) -> str:
+        """Command line of bushfit to print as the next step, with --force if its default results folder exists.
+
+        Args:
+            arguments: name of the command, its arguments and options.
+            name: name of the result, which names the default folder.
+        """
+        folder = Path("results", folder_name(name), arguments.split()[0])
+        return f"bushfit {arguments}{' --force' * folder.exists()}"
 
     def print(self, text: str) -> None:
         """Print a line of the result without interpreting markup."""
@@ -223,7 +228,7 @@ class Output:
             inputs: files that the command has read and must not replace.
         """
         self.print_warnings()
-        gc.freeze()  # figures make many objects: the search for unused ones need not pass through all others each time
+        gc.freeze()  # figures make many objects: garbage collection then skips all earlier ones
         written = write_results(folder, files, self.formats, overwrite=self.force, inputs=inputs)
         if document is not None:
             self.print_json(document)

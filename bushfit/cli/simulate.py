@@ -47,8 +47,8 @@ def command(source: Path, effects: tuple[str, ...], output: Output, **settings: 
     With CAMPAIGN, its [simulate] table states the model and the tests. With MODEL.json, this model is simulated in the
     paper's test programme. Use simulate to check whether `bushfit diagnose` would find an effect that you add with
     --effect. The equations are solved step by step in time, independently of the formulas that the fits use. Radial
-    tests follow the paper's formula; for a campaign that `bushfit init` writes from them, set shape = "calibrated" in
-    [bushing] of CAMPAIGN before the simulation, because init sets it, too.
+    tests follow the paper's formula. `bushfit init` writes campaigns with shape = "calibrated": to use init on the
+    simulated files, first set it in [bushing] of CAMPAIGN, too.
 
     Writes campaign.toml, its test files, and truth.json (the model that was simulated).
     """

@@ -37,7 +37,7 @@ _COARSE = 1e-3
 _MOST_POINTS = 60
 #: Misfit with a mistake corrected, relative to the misfit of the tests as recorded, up to which a fit follows; above 1
 #: because the grid is coarse.
-_WORTH_A_FIT = 1.3
+_LARGEST_RATIO = 1.3
 #: Smallest relative change of the misfit of a mistake; a smaller change is equivalent to a change of parameters.
 _LEAST_CHANGE = 1e-6
 #: Relative term on the diagonal of the normal equations that keeps three similar columns solvable.
@@ -211,7 +211,7 @@ class ClaimScreening:
         best_of_tests, selected = dict[tuple[int, ...], float](), list[Claim]()
         for index in np.argsort(misfits, kind="stable"):
             claim, misfit = candidates[index], float(misfits[index])
-            if changed[index] and misfit < _WORTH_A_FIT * min(before, best_of_tests.setdefault(claim.tests, misfit)):
+            if changed[index] and misfit < _LARGEST_RATIO * min(before, best_of_tests.setdefault(claim.tests, misfit)):
                 selected.append(claim)
         return selected[:limit]
 

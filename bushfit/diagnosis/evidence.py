@@ -61,7 +61,7 @@ def posterior(gram: Array, projections: Array) -> tuple[Array, Array, Array, Arr
     else:
         try:
             values, vectors = np.linalg.eigh(gram)
-        except np.linalg.LinAlgError:  # LAPACK fails, rarely, on many equal eigenvalues; the other triangle rounds anew
+        except np.linalg.LinAlgError:  # for many equal eigenvalues LAPACK may fail: use the other, equal triangle
             values, vectors = np.linalg.eigh(gram, UPLO="U")
     projections = np.einsum("...ij,...i->...j", vectors, projections)[..., None, :]
     prior_variance = np.square(SIZES)[:, None]
@@ -113,7 +113,7 @@ def block_gains(batch: Batch, projections: Array, gram: Array) -> tuple[Array, A
     if (signs := batch.signs[:, None]).any():
         standardised = signs * (amounts / np.sqrt(variances))[..., 0]
         gain = np.where(signs != 0, gain + np.log(2.0) + log_ndtr(standardised), gain)
-    return gain, np.square(np.abs(amounts @ batch.unit)).max(axis=-1)
+    return gain, np.square(np.abs(amounts @ batch.stiffness_change)).max(axis=-1)
 
 
 def mean_evidence(signatures: Array, log_evidence: Array, changes: Array) -> dict[int, Evidence]:

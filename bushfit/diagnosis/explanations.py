@@ -16,8 +16,8 @@ class Signature:
 
     Args:
         columns: change of the n whitened residuals per unit of each of c amounts (coefficients), (c, n).
-        unit: relative change of |K| per unit amount of each column, (c,); if `act_together`, the complex relative
-            change of the stiffness at p operating points, (c, p).
+        stiffness_change: relative change of the stiffness per unit amount of each column: the largest magnitude over
+            the tests, (c,); if `act_together`, the complex change at p operating points, (c, p).
         act_together: True if all columns act at once, with independent amounts of the same prior standard deviation;
             False if only one column acts, each with equal probability.
         sign: +1 if only positive amounts are possible (only without `act_together`); else 0.
@@ -26,7 +26,7 @@ class Signature:
     """
 
     columns: Array
-    unit: Array
+    stiffness_change: Array
     act_together: bool
     sign: int = 0
     covered_rows: tuple[slice, int] | None = None
@@ -55,8 +55,8 @@ class Signature:
         """
         if self.act_together:
             return self.columns
-        visible = self.unit > _UNSEEN
-        return self.columns * np.where(visible, 1.0 / np.where(visible, self.unit, 1.0), 0.0)[:, None]
+        visible = self.stiffness_change > _UNSEEN
+        return self.columns * np.where(visible, 1.0 / np.where(visible, self.stiffness_change, 1.0), 0.0)[:, None]
 
 
 @dataclass(frozen=True, eq=False)

@@ -89,13 +89,13 @@ class FaultyPart(Explanation):
         assert self.signature is not None
         signature = self.signature
         if form == "gain":
-            signature = replace(signature, columns=signature.columns[:1], unit=signature.unit[:1])
+            change = signature.stiffness_change[:1]
+            signature = replace(signature, columns=signature.columns[:1], stiffness_change=change)
         elif form == "points":
             size = np.abs(signature.columns).max(axis=0)
             rows = np.flatnonzero(size)
-            columns = np.zeros((rows.size, size.size))
-            columns[np.arange(rows.size), rows] = size[rows]
-            signature = replace(signature, columns=columns, unit=np.eye(len(columns)))
+            columns = size * (np.arange(size.size) == rows[:, None])
+            signature = replace(signature, columns=columns, stiffness_change=np.eye(len(columns)))
         return replace(self, signature=signature, form=form)
 
     def region(self, residual: Array, change: float) -> MisfitRegion:
@@ -306,8 +306,8 @@ def _frequencies(fit: FitResult, sweeps: Sequence[MeasuredSweep]) -> Iterator[Fa
                 ends = dict.fromkeys((bands[first][0], bands[first + width - 1][-1]))
                 name = f"{' to '.join(f'{end:.4g}' for end in ends)} Hz in {location}, at every amplitude"
                 chosen = [np.any(of_sweep, axis=0) for of_sweep in zip(*masks[window], strict=True)]
-                unit = np.kron(np.eye(width), np.array([[1.0], [1.0j]]))
-                part = _common_fault(fit, "frequency", name, members, chosen, np.concatenate(columns[window]), unit)
+                change = np.kron(np.eye(width), np.array([[1.0], [1.0j]]))
+                part = _common_fault(fit, "frequency", name, members, chosen, np.concatenate(columns[window]), change)
                 yield replace(part, may_be_physics=len({sweep.direction for sweep in members}) > 1)
 
 
@@ -340,7 +340,7 @@ def _common_fault(
     sweeps: Sequence[MeasuredSweep],
     chosen: Sequence[Array],
     columns: Array | None = None,
-    unit: Array = _SLOPING,
+    change: Array = _SLOPING,
 ) -> FaultyPart:
     """Explanation of a gap by errors of gain and phase, and their slopes, that some points of sweeps have in common.
 
@@ -352,7 +352,7 @@ def _common_fault(
         chosen: mask of the faulty points of each sweep, (n,) each.
         columns: change of the whitened residuals of `sweeps` per unit of each of c errors, (c, rows); None for gain,
             phase and their slopes.
-        unit: complex relative change of the stiffness per unit of each error at p points of the part, (c, p).
+        change: complex relative change of the stiffness per unit of each error at p points of the part, (c, p).
     """
     columns = _shift_columns(fit, sweeps, chosen, sloping=True) if columns is None else columns
     frequency, amplitude = (
@@ -360,7 +360,7 @@ def _common_fault(
         for axis in ("frequency", "amplitude")
     )
     ends = (float(frequency.min()), float(frequency.max())), (float(amplitude.min()), float(amplitude.max()))
-    signature = Signature(columns, unit, act_together=True, covered_rows=(fit.row_span(sweeps), fit.residual.size))
+    signature = Signature(columns, change, act_together=True, covered_rows=(fit.row_span(sweeps), fit.residual.size))
     return FaultyPart("part", family, name, signature, sweeps[0].direction, *ends)
 
 

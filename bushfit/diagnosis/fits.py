@@ -191,7 +191,7 @@ def result_of(
     notes = (*misses, *temperature_warning(model, fit.data_sets))
     return replace(
         build_result([closest], bounds, model=model, fixed=fixed, notes=notes, bounded_is_fixed=True),
-        # a correction has seen every run
+        # a correction is estimated from every run, so none is held out
         usable=expected_errors(model, fit.data_sets, fit=None if corrected else closest),
         model_error=error,
         unresolved=tuple(effect.name for effect in model.records if effect.twins and effect.name not in resolved),
@@ -202,6 +202,6 @@ def misfit_covariance(fit: FitResult) -> Covariance:
     """Covariance of the fitted parameters that are not at a bound, times the reduced chi-square if it exceeds 1."""
     free = fit.jacobian[fit.inner_indices]
     matrix = np.linalg.pinv(free @ free.T, rcond=1e-12, hermitian=True)
-    matrix *= max(fit.chi_square / max(fit.residual.size - len(matrix), 1), 1.0)  # what the fit misses
+    matrix *= max(fit.chi_square / max(fit.residual.size - len(matrix), 1), 1.0)  # scaled by the misfit
     slopes = fit.coordinates.slopes(fit.model.values)[fit.inner_indices]
     return Covariance(tuple(fit.names[i] for i in fit.inner_indices), matrix * np.outer(slopes, slopes))

@@ -113,9 +113,9 @@ class SearchState:
         tests: tests with their record, as read or corrected.
         fit: fit of the model with the added effects; errors of faulty tests and of a deviating rubber may be fitted,
             too.
-        bare: this fit with residuals divided by the random noise alone, not whitened by errors that points share.
-        log_prior: natural log of the prior probability of the set of explanations, and of the prior density of the
-            effects' coordinates with the factor of Laplace's method.
+        unwhitened: this fit with residuals divided by the random noise alone, not whitened by errors that points share.
+        log_prior: natural log of the prior probability of the set of explanations, plus that of the factor by which
+            Laplace's method integrates over the effects' parameters with their prior density.
         effects: names of the effects that were added.
         faulty_parts: faulty parts of the tests, whose points may deviate together.
         precision: prior precision (inverse variance) by fitting coordinate of the effects; infinite for a shape
@@ -125,7 +125,7 @@ class SearchState:
 
     tests: RecordedTests
     fit: FitResult
-    bare: FitResult
+    unwhitened: FitResult
     log_prior: float
     effects: tuple[str, ...] = ()
     faulty_parts: tuple[FaultyPart, ...] = ()
@@ -135,11 +135,11 @@ class SearchState:
     @classmethod
     def of_tests(cls, tests: RecordedTests) -> SearchState:
         """Create the initial state of a search: the starting model with nothing added."""
-        return cls(tests, tests.base, tests.bare, tests.log_odds, change=tests.change)
+        return cls(tests, tests.base, tests.unwhitened, tests.log_odds, change=tests.change)
 
     def with_fit(self, fit: FitResult) -> SearchState:
         """Replace the fit by another fit of the same model, whose effects have the same prior."""
-        return replace(self, fit=fit, bare=fit.reevaluate(fit.model, self.tests.bare.data_sets))
+        return replace(self, fit=fit, unwhitened=fit.reevaluate(fit.model, self.tests.unwhitened.data_sets))
 
     def with_effect(self, name: str, log_odds: float, before: FitResult) -> SearchState:
         """Add an effect that the fit of this state has already.
@@ -178,18 +178,18 @@ class SearchState:
 
         A parameter has no influence if an effect replaces the branch of the model in which it acts.
         """
-        precision = np.array([self.precision.get(name, 0.0) for name in self.bare.names])
-        return np.isfinite(precision) & self.bare.jacobian.any(axis=1)
+        precision = np.array([self.precision.get(name, 0.0) for name in self.unwhitened.names])
+        return np.isfinite(precision) & self.unwhitened.jacobian.any(axis=1)
 
     @cached_property
     def linear(self) -> LinearModel:
         """Residuals linearised at the fit, to compute the evidence for further explanations."""
-        bare, moves, columns = self.bare, self.has_influence, self.columns
-        precision = np.array([self.precision.get(name, 0.0) for name in bare.names])[moves]
+        fit, moves, columns = self.unwhitened, self.has_influence, self.columns
+        precision = np.array([self.precision.get(name, 0.0) for name in fit.names])[moves]
         common = [part for part in self.faulty_parts if part.form != "points"]
-        rows = np.concatenate([bare.jacobian[moves], *(part.columns for part in common)])
+        rows = np.concatenate([fit.jacobian[moves], *(part.columns for part in common)])
         precision = np.concatenate([precision, *(np.full(len(part.columns), part.amount**-2) for part in common)])
-        return LinearModel(bare.residual, rows, precision, columns.errors, columns.compound)
+        return LinearModel(fit.residual, rows, precision, columns.errors, columns.compound)
 
     @cached_property
     def columns(self) -> ExplanationColumns:
@@ -215,8 +215,8 @@ class SearchState:
         """
         added = [get_effect(name) for name in self.effects]
         replacing = {qualified_name(e, parameter) for e in added if e.replaces for parameter in e.parameters}
-        of_rubber = [name not in self.precision or name in replacing for name in self.bare.names]
-        volume = np.linalg.svd(self.bare.jacobian[of_rubber], compute_uv=False)
+        of_rubber = [name not in self.precision or name in replacing for name in self.unwhitened.names]
+        volume = np.linalg.svd(self.unwhitened.jacobian[of_rubber], compute_uv=False)
         count = len(self.tests.base.names)
         return self.log_prior + float(np.sum(np.log(np.maximum(volume[:count], 1e-12))))
 
@@ -253,18 +253,18 @@ class SearchState:
         The covariance allows for errors of the rig, for a smooth deviation of the rubber from its model, and for a
         relaxation of the rubber above the tested frequencies.
         """
-        bare, values, rig = self.bare, self.bare.model.values, self.columns.errors
+        fit, values, rig = self.unwhitened, self.unwhitened.model.values, self.columns.errors
         rig = replace(rig, cases=[rig.cases[n] for n in self._likely_cases])
-        signature = compound_signature(bare, MAXIMUM_NODES)
+        signature = compound_signature(fit, MAXIMUM_NODES)
         linear = replace(self.linear, rig=rig, compound=CompoundDeviation(signature, rig) if signature else None)
         moves = self.has_influence
-        slopes, count = bare.coordinates.slopes(values)[moves], np.count_nonzero(moves)
-        names = tuple(np.array(bare.names)[moves].tolist())
-        mean, covariance = linear.posterior_parameters(fast_relaxation(bare))
+        slopes, count = fit.coordinates.slopes(values)[moves], np.count_nonzero(moves)
+        names = tuple(np.array(fit.names)[moves].tolist())
+        mean, covariance = linear.posterior_parameters(fast_relaxation(fit))
         steps = dict(zip(names, slopes * mean[:count], strict=True))
         means = {name: float(np.clip(values[name] + x, *get_parameter(name).bounds)) for name, x in steps.items()}
         fitted = Covariance(names, covariance[:count, :count] * np.outer(slopes, slopes))
-        return means, fitted.restricted([name for name in names if name not in bare.at_bound])
+        return means, fitted.restricted([name for name in names if name not in fit.at_bound])
 
     def weigh(self, sets: Sequence[SignatureSet]) -> list[Evidence]:
         """Evidence of the tests for further explanations, averaged over the likely sizes of the rig's errors.

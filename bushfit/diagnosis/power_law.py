@@ -261,14 +261,14 @@ def nearest_power_law(
     Returns:
         The law, with intervals; None if the tests show none.
     """
-    bare, model = in_scatter_units(fitted), fitted.model
+    fit, model = in_scatter_units(fitted), fitted.model
     begun = model.with_values({name: value for name, value in start.items() if name in model.values})
-    rows, errors = bare.jacobian, rig_errors(bare, rig)
-    curves = SignatureSet.split([curve.signature for curve in unnamed_curves(bare)], errors)
-    cases = LinearModel(bare.residual, rows, np.zeros(len(rows)), errors).likely_cases(curves, _NEAR)
+    rows, errors = fit.jacobian, rig_errors(fit, rig)
+    curves = SignatureSet.split([curve.signature for curve in unnamed_curves(fit)], errors)
+    cases = LinearModel(fit.residual, rows, np.zeros(len(rows)), errors).likely_cases(curves, _NEAR)
     motions = {test.direction.motion for test in fitted.data_sets} - {STRAINING}
     quantities = [quantity for quantity in _QUANTITIES if motions and (quantity != "stiffness" or len(motions) == 1)]
-    terms = [Term(bare, quantity) for quantity in quantities]  # one unit: of translation only, or of rotation only
+    terms = [Term(fit, quantity) for quantity in quantities]  # one unit: of translation only, or of rotation only
     settled = (_settled_grid(fitted, term, errors, cases, begun, bounds) for term in terms)
     grids = sorted(filter(None, settled), key=lambda grid: -grid.log_evidence)
     if not grids or grids[0].log_evidence < logsumexp(grids[0].linear.project(cases).base):

@@ -72,7 +72,7 @@ class RigRows:
             errors = kernels.reshape(blocks, count * width, width) @ self.shared[number]
             errors = errors.reshape(blocks, count, width, size).transpose(1, 3, 0, 2)
             shared = second.shared[number].reshape(blocks * width, len(second.rows))
-            among_errors = errors.reshape(count * size, blocks * width) @ shared  # in one product, which is fast
+            among_errors = errors.reshape(count * size, blocks * width) @ shared  # one product, for speed
             among_errors = among_errors.reshape(count, size, len(second.rows))
             of_scatter = own_rows * weights[number, begin:end] @ second_rows.T
             products[chosen] = np.subtract(of_scatter, among_errors, out=among_errors)
@@ -129,8 +129,8 @@ class CompoundDeviation:
         Returns:
             Squared relative change, (cases,).
         """
-        vectors = self.modes[1][combinations]
-        return np.square(np.abs(np.einsum("nij,nj->ni", vectors, amounts) @ self.signature.unit)).max(axis=-1)
+        changes = np.einsum("nij,nj->ni", self.modes[1][combinations], amounts) @ self.signature.stiffness_change
+        return np.square(np.abs(changes)).max(axis=-1)
 
 
 class Batch(NamedTuple):
@@ -143,13 +143,13 @@ class Batch(NamedTuple):
         signatures: index of the explanation of each block, ascending, (blocks,).
         columns: indices of the columns of each block among those of all signatures, (blocks, width).
         signs: +1 for a block of one column whose amount must be positive, else 0, (blocks,).
-        unit: relative change of the stiffness per unit amount at p operating points, (width, p).
+        stiffness_change: relative change of the stiffness per unit amount at p operating points, (width, p).
     """
 
     signatures: Array
     columns: Array
     signs: Array
-    unit: Array
+    stiffness_change: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,18 +181,18 @@ class SignatureSet:
     def batches(self) -> list[Batch]:
         """Blocks of columns, by width: one for each signature whose columns act together, one for each other column."""
         first, by_shape = 0, defaultdict[tuple[int, bytes], list[tuple[int, Array, int]]](list)
-        units = dict[tuple[int, bytes], Array]()
+        changes = dict[tuple[int, bytes], Array]()
         for number, signature in enumerate(self.signatures):
             rows = np.arange(first, first := first + len(signature.columns))
-            unit = signature.unit if signature.act_together else np.eye(1)
+            change = signature.stiffness_change if signature.act_together else np.eye(1)
             blocks = rows[None] if signature.act_together else rows[:, None]
-            key = blocks.shape[1], unit.tobytes()
-            units[key] = unit
+            key = blocks.shape[1], change.tobytes()
+            changes[key] = change
             by_shape[key] += [(number, block, signature.sign) for block in blocks]
         arrays = [[np.array(values) for values in zip(*blocks, strict=True)] for blocks in by_shape.values()]
         return [
-            Batch(signatures, columns, signs, unit)
-            for (signatures, columns, signs), unit in zip(arrays, units.values(), strict=True)
+            Batch(signatures, columns, signs, change)
+            for (signatures, columns, signs), change in zip(arrays, changes.values(), strict=True)
         ]
 
     @cached_property

@@ -29,8 +29,8 @@ class RecordedTests:
 
     Args:
         base: fit of the starting model; its residuals are whitened by scatter and by errors that points share.
-        bare: this fit with residuals divided by the random noise alone, to compare hypotheses on errors that points
-            share.
+        unwhitened: this fit with residuals divided by the random noise alone, to compare hypotheses on errors that
+            points share.
         rig: stated accuracy class of the rig (gain and phase errors).
         errors: errors of the rig that points share.
         deviation: changes of the residuals if the rubber deviates smoothly from the model's laws; None if the tests
@@ -41,7 +41,7 @@ class RecordedTests:
     """
 
     base: FitResult
-    bare: FitResult
+    unwhitened: FitResult
     rig: RigSettings
     errors: RigErrors
     deviation: Signature | None
@@ -62,8 +62,8 @@ class RecordedTests:
             claim: mistake that is corrected; None for the tests as recorded.
             change: largest relative change of a recorded quantity in the correction; 0 for the tests as recorded.
         """
-        bare = in_scatter_units(base)
-        return cls(base, bare, rig, rig_errors(bare, rig), compound_signature(bare), log_odds, claim, change)
+        fit = in_scatter_units(base)
+        return cls(base, fit, rig, rig_errors(fit, rig), compound_signature(fit), log_odds, claim, change)
 
     @cached_property
     def columns(self) -> ExplanationColumns:
@@ -73,7 +73,8 @@ class RecordedTests:
     @cached_property
     def explanations(self) -> list[Explanation]:
         """Explanations of a gap other than effects: faulty parts of the tests, and smooth curves."""
-        return [*find_faulty_parts(self.bare), *unnamed_curves(self.bare), *power_laws(self.bare)]
+        fit = self.unwhitened
+        return [*find_faulty_parts(fit), *unnamed_curves(fit), *power_laws(fit)]
 
     @cached_property
     def compound_in_fits(self) -> Signature | None:
@@ -108,12 +109,15 @@ class ExplanationColumns:
 
     @cached_property
     def sets(self) -> list[SignatureSet]:
-        """Signatures (residual changes) of all explanations, in sets that change the same residuals."""
+        """Signatures (residual changes) of all `explanations` of the tests, in sets that change the same residuals."""
         return SignatureSet.split([e.signature for e in self.tests.explanations], self.errors)
 
     @cached_property
     def curves(self) -> list[SignatureSet]:
-        """Signatures (residual changes) of the smooth curves, in sets that change the same residuals."""
+        """Signatures of smooth curves: stiffness changes of unknown cause, in sets that change the same residuals.
+
+        Power laws are not included.
+        """
         curves = [e for e in self.tests.explanations if e.kind == "unnamed" and e.family != POWER_LAW]
         return SignatureSet.split([curve.signature for curve in curves], self.errors)
 

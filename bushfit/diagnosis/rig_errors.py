@@ -124,16 +124,15 @@ class RigErrors:
 
     @cached_property
     def kernels(self) -> tuple[Array, Array]:
-        """Parts of the inverse covariance of the residuals (noise and rig errors), for each combination of sizes.
+        """Matrices that correct inner products, weighted by the random noise, for the errors that residuals share.
 
         Returns:
-            K = D (1 + D W N^-1 W^T D)^-1 D with noise variances N and rig errors W of sizes D, (blocks, combinations,
-            w, w);
-            and the natural log of the determinant of the covariance, (combinations,).
+            K = D (1 + D W N^-1 W^T D)^-1 D of each block and each combination of sizes, (blocks, combinations, w, w):
+            N are the noise variances, W the changes of the residuals by the w shared errors of the block, and D the
+            sizes of these errors; and the natural log of the determinant of the covariance, (combinations,).
 
         Notes:
-            The covariance is N + W^T D^2 W, so whitened inner products of rows R are R N^-1 R^T less (W N^-1 R^T)^T K
-            (W N^-1 R^T).
+            The covariance is S = N + W^T D^2 W, so R S^-1 R^T = R N^-1 R^T - (W N^-1 R^T)^T K (W N^-1 R^T) for rows R.
         """
         sizes, _ = self.combinations
         weights, scatter = self.weights

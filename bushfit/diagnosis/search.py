@@ -37,7 +37,7 @@ from bushfit.fitting.problem import FitResult
 from bushfit.progress import track
 
 #: Maximum number of refits of hypotheses that are probable by the linear model alone; for time.
-_SETTLED = 8
+_LAST_REFITS = 8
 #: Number of mistakes that are fitted, and that are combined with effects in each round, the most promising first; and
 #: number of faulty parts added to a state; for time.
 _CLAIMS, _CORRECTED, _FAULTY_PARTS = 4, 2, 2
@@ -46,7 +46,7 @@ _SLIGHT = 3.0
 #: Number of rivals that are refitted from the values of the most probable state in each round; for time.
 _RIVALS = 6
 #: Reduced chi-square above which the gap has distorted the parameters too much to start a refit from their values.
-_BENT = 1.5
+_DISTORTED = 1.5
 
 
 class _Step(NamedTuple):
@@ -93,7 +93,7 @@ class Search:
         self._most_effects = max(settings.max_effects - adopted, min(settings.max_effects, 1))
         tests = RecordedTests.of_fit(self.base, self.data.campaign.rig)
         self.root = SearchState.of_tests(tests)
-        self.proposals = proposals(tests.bare, settings.without, self.base.fixed)
+        self.proposals = proposals(tests.unwhitened, settings.without, self.base.fixed)
         self._start_rivals = partial(start_rivals, fixed=self.base.fixed, bounds=self.data.bounds)
         self._log_priors = prior_odds([*self.proposals, *tests.explanations])
         families = {e.family for e in (*self.outlier_clusters, *tests.explanations) if e.kind == "part"}
@@ -115,8 +115,8 @@ class Search:
                 effects = list[Proposal]()
                 if len(state.effects) < self._most_effects:
                     excluded = (*self.settings.without, *state.effects)
-                    fixed = self.base.fixed if depth < ROUNDS else None  # the last round refits nothing
-                    effects = self.proposals if state is self.root else proposals(state.bare, excluded, fixed)
+                    fixed = self.base.fixed if depth < ROUNDS else None  # in the last round nothing is refitted
+                    effects = self.proposals if state is self.root else proposals(state.unwhitened, excluded, fixed)
                 sets = SignatureSet.split([effect.signature for effect in effects], state.columns.errors)
                 evidence = state.weigh([*sets, *state.columns.sets])
                 explanations = [*(effect for effect in effects if effect.signature), *state.tests.explanations]
@@ -146,13 +146,13 @@ class Search:
                     corrected.setdefault(state.tests.claim.tests, state)
             for state in [*corrected.values()][:_CORRECTED]:
                 if state not in beam and self._is_improved(state):
-                    beam.append(state)  # tests with a mistake and an effect are explained by neither alone
+                    beam.append(state)  # because neither explains tests that have a mistake and an effect
             if not beam:
                 break
         for linear in self._unrefitted_hypotheses():
-            assert isinstance(linear.last, Proposal)  # all else needs no refit
+            assert isinstance(linear.last, Proposal)  # all other explanations need no refit
             if not self._with_effects(linear.state, [linear.last]):
-                del self._known[linear.key]  # no response with it, or far behind
+                del self._known[linear.key]  # no response with this effect, or improbable
         return self._ordered_hypotheses()
 
     def _ordered_hypotheses(self) -> list[Hypothesis]:
@@ -177,7 +177,7 @@ class Search:
 
     def _unrefitted_hypotheses(self) -> Iterator[Hypothesis]:
         """Yield for a refit, one by one, the most probable hypotheses whose evidence is from the linear model."""
-        for _ in range(_SETTLED):
+        for _ in range(_LAST_REFITS):
             ordered = self._ordered_hypotheses()
             share = np.exp([hypothesis.log_posterior - ordered[0].log_posterior for hypothesis in ordered])
             ahead = (np.cumsum(share) - share) / share.sum()
@@ -225,7 +225,7 @@ class Search:
         for hypothesis, clusters in product(hypotheses, self._cluster_sets):
             log_odds = sum(self._meeting_odds + cluster.log_odds for cluster in clusters)
             log_posterior = hypothesis.log_posterior + log_odds
-            if hypothesis.change <= self.settings.tolerance:  # what is that small is no part of an explanation
+            if hypothesis.change <= self.settings.tolerance:  # explanations within the tolerance are left out
                 hypothesis = self.root.hypotheses[0]
             change = max(hypothesis.change, *(cluster.size for cluster in clusters))
             candidates.append(replace(hypothesis, clusters=clusters, log_posterior=log_posterior, change=change))
@@ -246,7 +246,7 @@ class Search:
             depth: number of explanations in the state.
         """
         state = step.state
-        by_evidence, by_score = REFITS[1 if depth else 2 if state.plain.reduced_chi_square > _BENT else 0]
+        by_evidence, by_score = REFITS[1 if depth else 2 if state.plain.reduced_chi_square > _DISTORTED else 0]
         effects = [effect for effect in step.effects if state.key | {effect.name} not in self._visited]
         prior = {effect.name: self._log_odds("effect", effect.name) for effect in effects}
         base = state.log_weight - state.log_posterior
@@ -269,7 +269,7 @@ class Search:
         if not effects:
             return []
         models = {effect.name: effect.model for effect in effects}
-        start = self.start if not state.effects and state.plain.reduced_chi_square > _BENT else {}
+        start = self.start if not state.effects and state.plain.reduced_chi_square > _DISTORTED else {}
         grown, starts = dict[str, SearchState](), self._start_rivals(models, state.fit.data_sets, start)
         for deviation in dict.fromkeys((state.likeliest_deviation, 0.0)):
             for name, fit in fit_rivals(starts, state.free_columns(deviation)).items():
@@ -286,7 +286,8 @@ class Search:
             step: state to extend, with the evidence for faulty parts.
         """
         state = step.state
-        is_bent = state.plain.reduced_chi_square > _BENT  # perhaps by one of the parts, which a refit would show
+        # the faulty part itself may have distorted the parameters
+        is_distorted = state.plain.reduced_chi_square > _DISTORTED
         faulty_parts = [(part, evidence) for part, evidence in step.evidence if isinstance(part, FaultyPart)]
         faulty_parts.sort(key=lambda pair: -(self._log_odds("part", pair[0].name) + pair[1].total))
         for common, _ in faulty_parts[:_FAULTY_PARTS]:
@@ -296,15 +297,15 @@ class Search:
             evidences = state.weigh(SignatureSet.split([part.signature for part in parts], state.columns.errors))
             part, evidence = max(zip(parts, evidences, strict=True), key=lambda pair: pair[1].total)
             log_odds = self._log_odds("part", part.name)
-            if state.log_weight + log_odds + evidence.total < state.log_posterior - _SLIGHT * is_bent:
+            if state.log_weight + log_odds + evidence.total < state.log_posterior - _SLIGHT * is_distorted:
                 continue
             grown = replace(
                 state,
                 faulty_parts=(*state.faulty_parts, replace(part, amount=evidence.likeliest)),
-                log_prior=state.log_prior + log_odds - log(SIZES.size * evidence.share),  # stands for all sizes
+                log_prior=state.log_prior + log_odds - log(SIZES.size * evidence.share),  # in place of all sizes
                 change=max(state.change, evidence.size),
             )
-            if is_bent:
+            if is_distorted:
                 models, tests, columns = {"": grown.fit.model}, grown.fit.data_sets, grown.free_columns(0.0)
                 starts = [self._start_rivals(models, tests, s) for s in ([{}] if state.effects else [{}, self.start])]
                 fits = [fit for rivals in starts for fit in fit_rivals(rivals, columns).values()]
@@ -359,8 +360,8 @@ class Search:
     def _corrected_records(self) -> Iterator[SearchState]:
         """Generate states in which one recording mistake is corrected, the most promising first."""
         possible = claims(self.data, self.settings.without)
-        for claim in track("mistakes put right", list(ClaimScreening(self.data).best(possible, _CLAIMS))):
-            with suppress(FitError, ModelError):  # corrected tests that nothing can be fitted to
+        for claim in track("mistakes corrected", list(ClaimScreening(self.data).best(possible, _CLAIMS))):
+            with suppress(FitError, ModelError):  # the model cannot be fitted to the corrected tests
                 fit = self.fit_corrected(claim.corrected())
                 if [test.size for test in fit.data_sets] == [test.size for test in self.base.data_sets]:
                     log_odds = log(ODDS["record"] / len(possible))

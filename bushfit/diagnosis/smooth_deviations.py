@@ -84,9 +84,9 @@ def compound_signature(fit: FitResult, count: int = _COMPOUND_PATTERNS) -> Signa
     columns, changes = map(np.concatenate, zip((columns, changes), _formula_changes(fit), strict=True))
     for loops in group_repeats(split_by_kind(fit.data_sets)[0]):
         columns = np.concatenate((columns, _repeat_changes(fit, loops, compound_shapes)))
-    unit = np.zeros((len(columns), changes.shape[-1]), dtype=complex)
-    unit[: len(changes)] = changes
-    return Signature(columns, unit, act_together=True)
+    stiffness_change = np.zeros((len(columns), changes.shape[-1]), dtype=complex)
+    stiffness_change[: len(changes)] = changes
+    return Signature(columns, stiffness_change, act_together=True)
 
 
 def _formula_changes(fit: FitResult) -> tuple[Array, Array]:

@@ -19,25 +19,25 @@ from bushfit.diagnosis.smooth_deviations import COMPOUND
 from bushfit.effects import get_effect
 from bushfit.effects.contract import Level
 
-#: Part of an explanation: its kind ("effect", "mistake", "unnamed", or `_FAULT` and the kind of a fault), and its name.
-_Part = tuple[str, Any]
+#: Component of an explanation: kind ("effect", "mistake", "unnamed", or `_FAULT` and the kind of a fault), and name.
+_Component = tuple[str, Any]
 _FAULT = "fault: "
 #: Probability of a hypothesis below which it changes no figure: thousands of hypotheses are merged in each round.
 _NEGLIGIBLE = 1e-12
 #: Conditions of a test, on which a smooth deviation of the compound does not depend.
 _CONDITIONS = ("temperature", "preload")
-#: Texts for the parts of an explanation that are no known effect.
+#: Texts for the components of an explanation that are no known effect.
 NAMELESS = "an unknown cause"
 LEVELS = "errors of levels beyond the class of the rig"
 
 
 @dataclass(frozen=True, eq=False)
 class Composition:
-    """Explanation of a gap by a set of effects, faults and recording mistakes, merged from all hypotheses with it.
+    """Explanation of a gap by a set of components: effects, faults and recording mistakes, merged from hypotheses.
 
     Args:
-        probability: probability of these parts, given that something is missing in the model.
-        best: most probable hypothesis with these parts.
+        probability: probability of these components, given that something is missing in the model.
+        best: most probable hypothesis with these components.
         names: effects in the set. If the set includes a smooth deviation of the rubber, effects of the rubber are not
             listed, because the deviation includes them.
         unnamed: True if an unnamed smooth curve, or a deviation of the compound, is part of the explanation.
@@ -55,18 +55,18 @@ class Composition:
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """Names of all parts: recording mistake (as --adopt accepts it), effects, faults, smooth curves."""
+        """Names of all components: recording mistake (as --adopt accepts it), effects, faults, smooth curves."""
         claim, faults = self.best.claim, (f"fault: {part.name}" for part in self.faulty_parts)
         return (*(claim.labels if claim else ()), *self.names, *faults, *self.nameless)
 
     @property
     def label(self) -> str:
-        """Names of all parts, joined by +."""
+        """Names of all components, joined by +."""
         return " + ".join(self.labels)
 
     @property
     def nameless(self) -> tuple[str, ...]:
-        """Texts for the parts without a known effect: errors at one amplitude or frequency, and smooth curves."""
+        """Texts for the components without a known effect: errors at one amplitude or frequency, and smooth curves."""
         return (*([LEVELS] if self.best.levels else []), *([NAMELESS] if self.unnamed else []))
 
     @property
@@ -75,7 +75,7 @@ class Composition:
         return (*([str(self.best.claim.mistake.name)] if self.best.claim else []), *self.names)
 
     @property
-    def parts(self) -> frozenset[str]:
+    def components(self) -> frozenset[str]:
         """Names that identify the explanation: effects, mistake, kinds of faults, and "unnamed" for a smooth curve."""
         marks = [f"part: {part.family}" for part in self.faulty_parts] + ["levels"] * self.best.levels
         return frozenset((*self.causes, *marks, *["unnamed"] * self.unnamed))
@@ -96,7 +96,7 @@ class Finding:
 
     Args:
         verdict: verdict in one word.
-        nothing: probability that nothing is missing beyond noise and tolerance.
+        nothing: probability that nothing is missing that changes the stiffness by more than the tolerance.
         reported: explanations to report, the most probable first, only one if its probability is 97 % or more; empty
             if nothing is missing.
         leads: names of effects that reduce the gap but do not explain it.
@@ -136,30 +136,30 @@ def decide_verdict(hypotheses: Sequence[Hypothesis], tolerance: float, *, gap_st
     first, leads = compositions[0], _leads(large)
     before = np.cumsum([0.0, *(composition.probability for composition in compositions[:-1])])
     likely = [composition for composition, sum_before in zip(compositions, before, strict=True) if sum_before < NAMED]
-    common = frozenset.intersection(*(composition.parts for composition in likely))
+    common = frozenset.intersection(*(composition.components for composition in likely))
     unnamed = sum(composition.probability for composition in likely if composition.unnamed)
-    if first.parts == (common | {"unnamed"} if unnamed > 0.5 else common):
-        # all that is probable has these parts; the tests show no other part, but perhaps that there is one
-        return _verdict_on_parts(likely, nothing, leads)
+    if first.components == (common | {"unnamed"} if unnamed > 0.5 else common):
+        # all probable explanations have these components, and they have no other common component
+        return _verdict_on_components(likely, nothing, leads)
     reported, fits = tuple(likely[:MOST_REPORTED]), first.best.p_value >= DOES_NOT_FIT
-    only_faults = common and all(part.startswith("part: ") for part in common)
-    if fits and only_faults:  # whatever else there is, this has to go first
+    # faulty parts that are certain must be measured again before a verdict on the rest
+    if fits and common and all(component.startswith("part: ") for component in common):
         return Finding("unexplained", nothing, reported, leads)
     share = {name: sum(c.probability for c in compositions if name in c.names) for name in first.names}
     names = tuple(name for name in first.names if share[name] >= NAMED)
-    nameless = sum(composition.probability for composition in likely if composition.parts == {"unnamed"})
+    nameless = sum(composition.probability for composition in likely if composition.components == {"unnamed"})
     if len(likely) <= MOST_REPORTED and nameless < 0.5 and fits:
         return Finding("ambiguous", nothing, reported, leads, names)
-    if names and first.unnamed and fits:  # whatever the compound does beside them
+    if names and first.unnamed and fits:  # these effects, in addition to a deviation of the compound
         return Finding("partly", nothing, reported, leads, names)
     return Finding("described", nothing, reported, leads)
 
 
-def _verdict_on_parts(likely: Sequence[Composition], nothing: float, leads: Sequence[str]) -> Finding:
-    """Decide the verdict if the parts of the most probable explanation have a probability of 97 % or more.
+def _verdict_on_components(likely: Sequence[Composition], nothing: float, leads: Sequence[str]) -> Finding:
+    """Decide the verdict if the components of the most probable explanation have a probability of 97 % or more.
 
     Args:
-        likely: probable explanations, the first with these parts.
+        likely: probable explanations, the first with these components.
         nothing: probability that nothing is missing.
         leads: names of effects that reduce the gap but do not explain it.
     """
@@ -169,7 +169,7 @@ def _verdict_on_parts(likely: Sequence[Composition], nothing: float, leads: Sequ
     if fits and (first.may_mislead or not (first.causes or first.unnamed)):
         return Finding("unexplained", nothing, reported, leads)
     curve = best.unnamed not in ("", COMPOUND) and best.last_change >= (1.0 - LEAST_NAMED_SHARE) * best.change
-    # a mistake has to close the gap alone, but for what the rubber does
+    # a mistake must close the gap without effects of the rig; effects of the rubber are permitted
     rig_effects = any(get_effect(name).level != Level.MATERIAL for name in best.effects)
     compensated = best.claim and (rig_effects or best.faulty_parts)
     if not first.causes or curve or compensated or not fits:
@@ -196,31 +196,31 @@ def _leads(pairs: Sequence[tuple[Hypothesis, float]]) -> tuple[str, ...]:
     return tuple(name for name in pairs[0][0].effects if share[laws[name]] >= LEAST_NAMED_SHARE * total)
 
 
-def _parts_of(hypothesis: Hypothesis) -> frozenset[_Part]:
-    """Kinds and names of the parts of a hypothesis; hypotheses with equal parts are merged into one explanation.
+def _components_of(hypothesis: Hypothesis) -> frozenset[_Component]:
+    """Components of a hypothesis; hypotheses with equal components are merged into one explanation.
 
     Effects of the rubber are not listed if a deviation of the compound, or errors of levels, could imitate them. A
     deviation, a function of frequency and strain, cannot imitate effects of temperature and preload. A curve without a
     name, or a pattern of faulty parts of the tests, is listed only if there is nothing else.
     """
     nameless = Level.MATERIAL if hypothesis.compound_deviates or hypothesis.levels else None
-    apart = () if hypothesis.levels else _CONDITIONS
+    separable = () if hypothesis.levels else _CONDITIONS
     effects = [(name, get_effect(name)) for name in hypothesis.effects]
-    shown = [name for name, effect in effects if effect.level != nameless or {*effect.depends_on} & {*apart}]
-    parts: list[_Part] = [("effect", name) for name in shown]
+    listed = [name for name, effect in effects if effect.level != nameless or {*effect.depends_on} & {*separable}]
+    components: list[_Component] = [("effect", name) for name in listed]
     pattern = is_pattern(hypothesis.faulty_parts)
     if not pattern:
-        parts += [(f"{_FAULT}{part.family}", part.name) for part in hypothesis.faulty_parts]
-        parts += [(f"{_FAULT}levels", "")] * hypothesis.levels
-    parts += [("mistake", hypothesis.claim.key)] if hypothesis.claim else []
-    return frozenset(parts or ([("unnamed", "")] if pattern or hypothesis.unnamed else []))
+        components += [(f"{_FAULT}{part.family}", part.name) for part in hypothesis.faulty_parts]
+        components += [(f"{_FAULT}levels", "")] * hypothesis.levels
+    components += [("mistake", hypothesis.claim.key)] if hypothesis.claim else []
+    return frozenset(components or ([("unnamed", "")] if pattern or hypothesis.unnamed else []))
 
 
 def compose(pairs: Sequence[tuple[Hypothesis, float]]) -> list[Composition]:
-    """Merge hypotheses with the same parts, with or without a smooth deviation of the rubber, into explanations.
+    """Merge hypotheses with the same components, with or without a smooth deviation of the rubber, into explanations.
 
-    A set of parts that is less probable than a subset of it is merged with the subset; an effect that is a limiting
-    case of another is merged with that effect. Faulty parts of the same kinds are merged.
+    A set of components that is less probable than a subset is merged with the subset; an effect that is a limiting case
+    of another is merged with that effect. Faulty parts of the same kinds are merged.
 
     Args:
         pairs: hypotheses and their posterior weights, the most probable first.
@@ -228,27 +228,27 @@ def compose(pairs: Sequence[tuple[Hypothesis, float]]) -> list[Composition]:
     Returns:
         Explanations, the most probable first, whose probabilities sum to one.
     """
-    best: dict[frozenset[_Part], Hypothesis] = {}
-    total, unnamed, merged = (defaultdict[frozenset[_Part], float](float) for _ in range(3))
+    best: dict[frozenset[_Component], Hypothesis] = {}
+    total, unnamed, merged = (defaultdict[frozenset[_Component], float](float) for _ in range(3))
     for hypothesis, weight in pairs:
-        parts = _parts_of(hypothesis)
-        if parts not in best or (hypothesis.refitted and not best[parts].refitted):
-            best[parts] = hypothesis
-        total[parts] += weight
-        unnamed[parts] += weight * (bool(hypothesis.unnamed) or is_pattern(hypothesis.faulty_parts))
-    order = {parts: rank for rank, parts in enumerate(sorted(total, key=lambda parts: -total[parts]))}
-    for parts in order:
-        subsets = (frozenset(chosen) for count in range(1, len(parts)) for chosen in combinations(parts, count))
-        limit = frozenset((kind, (kind == "effect" and get_effect(name).limit) or name) for kind, name in parts)
+        components = _components_of(hypothesis)
+        if components not in best or (hypothesis.refitted and not best[components].refitted):
+            best[components] = hypothesis
+        total[components] += weight
+        unnamed[components] += weight * (bool(hypothesis.unnamed) or is_pattern(hypothesis.faulty_parts))
+    order = {chosen: rank for rank, chosen in enumerate(sorted(total, key=lambda chosen: -total[chosen]))}
+    for whole in order:
+        subsets = (frozenset(chosen) for count in range(1, len(whole)) for chosen in combinations(whole, count))
+        limit = frozenset((kind, (kind == "effect" and get_effect(name).limit) or name) for kind, name in whole)
         simpler = merged.keys() & {*subsets, limit}
-        merged[min(simpler, key=order.__getitem__, default=parts)] += total[parts]
-    kinds = defaultdict[Hashable, list[frozenset[_Part]]](list)
-    for parts in sorted(merged, key=lambda parts: -merged[parts]):
-        kinds[frozenset((kind, "" if kind.startswith(_FAULT) else name) for kind, name in parts)].append(parts)
-    whole = sum(merged.values())
+        merged[min(simpler, key=order.__getitem__, default=whole)] += total[whole]
+    kinds = defaultdict[Hashable, list[frozenset[_Component]]](list)
+    for whole in sorted(merged, key=lambda chosen: -merged[chosen]):
+        kinds[frozenset((kind, "" if kind.startswith(_FAULT) else name) for kind, name in whole)].append(whole)
+    sum_of_weights = sum(merged.values())
     compositions = [
         Composition(
-            sum(merged[parts] for parts in members) / whole,
+            sum(merged[member] for member in members) / sum_of_weights,
             best[members[0]],
             tuple(name for name in best[members[0]].effects if ("effect", name) in members[0]),
             unnamed[members[0]] > 0.5 * total[members[0]],

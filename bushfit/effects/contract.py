@@ -87,8 +87,8 @@ class Parameter:
         name: ASCII name; files and reports use `<effect>.<name>`, except for elastic, springpot and friction.
         unit: SI unit; "1" for a ratio.
         bounds: smallest and largest plausible value.
-        neutral: value at which the effect vanishes; None if another parameter has this value.
-        typical: usual distance from the neutral value, by which a fit scales the parameter.
+        neutral: value at which the effect vanishes; None for a parameter that cannot make the effect vanish.
+        typical: usual distance from the neutral value (from 0 if None), by which a fit scales the parameter.
         meaning: description for users.
         log: True if a fit varies the logarithm of the (positive) parameter.
         opposite: description of minus the value, if users understand it better where the value is negative.

@@ -125,9 +125,14 @@ class Unnamed:
         return self.largest / _DEVIATIONS
 
     def with_untested(self, place: Place) -> "Unnamed":
-        """Return the correction extended to `place`, an untested direction of the bushing, whose rubber is the same.
+        """Apply the relative correction of the tested directions to an untested direction of the same bushing.
 
-        Unchanged for another bushing or specimen, and if the tested directions have different corrections.
+        Args:
+            place: direction or specimen.
+
+        Returns:
+            The correction, valid for `place` as well; unchanged if `place` is tested or belongs to another bushing or
+            specimen, or if the corrections of the tested directions differ.
         """
         patch, body = self.patches[0], {f"{place.body} {axis}".strip() for axis in Direction}
         if len(self.patches) > 1 or str(place) in patch.directions or body.isdisjoint(patch.directions):

@@ -125,7 +125,7 @@ def prony_omissions(series: Sequence[PronySeries]) -> Iterator[Caveat]:
         ratios = np.concatenate([np.abs(middle.exact / one.exact) for one in series])
         strain, *ends = (number(100.0 * one.strain, 3) for one in (middle, series[0], series[-1]))
         errors = f"errors of {format_deviation(ratios)} in |G| at {' to '.join(ends)} %"
-        sentence = f"compound: each series has one strain amplitude. The series of {strain} % has {errors}"
+        sentence = f"compound: each series is valid at one strain amplitude. The series for {strain} % has {errors}"
         yield Caveat("format_error", sentence)
     sentence = "compound: friction is a viscous loss at that amplitude, without a force at rest"
     yield Caveat("format_omission", sentence)

@@ -107,10 +107,10 @@ class Comparison:
         return max(float(np.quantile(self.largest_errors, 1.0 - CHANCE)), 1.0)
 
     def widened(self, band: Band) -> Band:
-        """Widen a pointwise 95 % band to a simultaneous one, which contains all points together with 95 % probability.
+        """Widen a pointwise 95 % band by the factor `widening`, so that it contains all points together at 95 %.
 
         Args:
-            band: difference of one contrast with its pointwise band.
+            band: difference in stiffness or loss factor between the two results, with its pointwise band.
         """
         low, high = (band.value + self.widening * (end - band.value) for end in (band.low, band.high))
         return replace(band, low=low, high=high)

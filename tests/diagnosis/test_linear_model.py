@@ -94,7 +94,7 @@ def test_worth_is_that_of_the_covariance_in_full(seed):
         parts = (
             [signature.columns]
             if signature.act_together
-            else [column[None] / unit for column, unit in zip(signature.columns, signature.unit, strict=True)]
+            else [row[None] / unit for row, unit in zip(signature.columns, signature.stiffness_change, strict=True)]
         )
         cases = [size * part for size in SIZES for part in parts]
         by_node = [

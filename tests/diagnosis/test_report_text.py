@@ -162,7 +162,7 @@ def of(**odds: float) -> Finding:
 
 def told(finding: Finding) -> dict[str, float]:
     """Parts and rounded probabilities of what is told."""
-    return {"+".join(sorted(each.parts)): round(each.probability, 2) for each in finding.reported}
+    return {"+".join(sorted(each.components)): round(each.probability, 2) for each in finding.reported}
 
 
 @pytest.mark.parametrize(
