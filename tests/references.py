@@ -1,7 +1,8 @@
 """Results of commands as lines of text, and their comparison with stored references.
 
-A line of data is `name = values` or `name = value ± standard error`, compared relative to its largest number. In other
-lines, words are compared exactly and numbers with a tolerance.
+A line of data is `name = values` or `name = value ± standard error`, compared relative to its largest number; gains of
+chi-square, which span decades, are each compared on their own. In other lines, words are compared exactly and numbers
+with a tolerance.
 """
 
 import difflib
@@ -166,8 +167,9 @@ def agree(expected: str, obtained: str) -> bool:
     if all(lines):
         (name, values, count, *means), other = (line.groups(default="") for line in lines)
         old, new = (np.array(" ".join(texts).split(), float) for texts in ((values, *means), (other[1], *other[3:])))
-        least = 1.0 if ".covariance." in name else float(expected.partition(" ± ")[2] or 0.0)
-        scale = np.abs(old).max(initial=least)
+        in_noise = re.search(r"covariance|prior.distance|chi-square gain", name)
+        least = 1.0 if in_noise else float(expected.partition(" ± ")[2] or 0.0)
+        scale = np.maximum(np.abs(old) if "chi-square gain" in name else np.abs(old).max(initial=0.0), least)
         tolerance = DERIVED if DERIVATIVES.search(name) else DATA
         alike = count == other[2] and agree(f"| {name}", f"| {other[0]}")
         return alike and bool(np.all(np.abs(new - old) <= tolerance * scale + 1e-12))

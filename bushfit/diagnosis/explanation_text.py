@@ -13,7 +13,6 @@ from bushfit.diagnosis.search import Search
 from bushfit.diagnosis.verdict import Composition, Finding
 from bushfit.effects import get_effect, qualified_name
 from bushfit.effects.unnamed import NAME as UNNAMED
-from bushfit.fitting.problem import FitResult
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
 from bushfit.model.result import Result
@@ -113,29 +112,25 @@ def list_candidates(
     log_posteriors = np.array([hypothesis.log_posterior for hypothesis in hypotheses])
     weights = np.exp(log_posteriors - log_posteriors[0])
     shares = (weights / weights.sum()).tolist()
-    candidates, alone, probability = list[CandidateResult](), dict[str, FitResult](), defaultdict[str, float](float)
+    candidates, probability = list[CandidateResult](), defaultdict[str, float](float)
     for hypothesis, share in zip(hypotheses, shares, strict=True):
         for name in {*hypothesis.effects}:
             probability[name] += share
-        if len(hypothesis.key) != 1:
-            continue
-        if hypothesis.refitted and hypothesis.effects:
-            alone[hypothesis.effects[0]] = hypothesis.state.plain
-        elif claim := hypothesis.claim:
-            gain = base.chi_square - hypothesis.state.plain.chi_square
+        if len(hypothesis.key) == 1 and (claim := hypothesis.claim):
+            score = base.chi_square - hypothesis.state.plain.chi_square
             why = "closes the gap" if first and first.best is hypothesis else _LESS_LIKELY
-            candidates.append(CandidateResult(" + ".join(claim.labels), gain, gain, share, {}, why))
+            candidates.append(CandidateResult(" + ".join(claim.labels), score, score, share, {}, why))
     for proposal in search.proposals:
-        name, after = proposal.name, alone.get(proposal.name)
-        if after is None:
-            why = "score too small to refit" if proposal.visible else "not visible in these tests"
-            candidates.append(CandidateResult(name, proposal.score, None, probability[name], {}, why))
-            continue
-        values = {key: value for key, value in after.model.values.items() if key not in base.model.values}
-        why = _LESS_LIKELY
+        name, after = proposal.name, search.refits.get(proposal.name)
+        gain, values = None, dict[str, float]()
+        why = "score too small to refit" if proposal.visible else "not visible in these tests"
+        if after:
+            gain = base.chi_square - after.chi_square
+            values = {key: value for key, value in after.model.values.items() if key not in base.model.values}
         if first and name in first.best.effects:
             why = "part of the most probable explanation" if name in first.names else _LEAD
-        gain = base.chi_square - after.chi_square
+        elif name in search.refits:
+            why = _LESS_LIKELY if after else "its refit is far behind that of another effect"
         candidates.append(CandidateResult(name, proposal.score, gain, probability[name], values, why))
     return sorted(candidates, key=lambda candidate: -candidate.score)
 

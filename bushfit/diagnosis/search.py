@@ -76,6 +76,8 @@ class Search:
         settings: limits of the diagnosis, and effects and mistakes not to consider.
         start: starting values read from the data, by parameter, for a fit that the gap has distorted.
         outlier_clusters: frequencies at which several outliers were left out.
+        refits: fits of the starting model with one effect and without a smooth deviation, by the name of the effect;
+            None for a fit far behind the others.
     """
 
     data: PreparedCampaign
@@ -84,6 +86,7 @@ class Search:
     settings: DiagnosisSettings
     start: Mapping[str, float]
     outlier_clusters: Sequence[OutlierCluster]
+    refits: dict[str, FitResult | None] = field(default_factory=dict)
     _known: dict[frozenset[Hashable], Hypothesis] = field(default_factory=dict)
     _visited: set[frozenset[Hashable]] = field(default_factory=set)
 
@@ -272,7 +275,10 @@ class Search:
         start = self.start if not state.effects and state.plain.reduced_chi_square > _DISTORTED else {}
         grown, starts = dict[str, SearchState](), self._start_rivals(models, state.fit.data_sets, start)
         for deviation in dict.fromkeys((state.likeliest_deviation, 0.0)):
-            for name, fit in fit_rivals(starts, state.free_columns(deviation)).items():
+            fits = fit_rivals(starts, state.free_columns(deviation))
+            if not deviation and not state.key:
+                self.refits.update({name: fits.get(name) for name in models})
+            for name, fit in fits.items():
                 log_odds = self._log_odds("effect", name)
                 candidate = self._visit(state.with_fit(fit).with_effect(name, log_odds, state.fit))
                 if name not in grown or candidate.log_posterior > grown[name].log_posterior:
