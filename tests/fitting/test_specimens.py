@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fits import joint_fit
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import FitSettings
@@ -17,7 +16,6 @@ from bushfit.campaign.simulated import SimulatedLoop, SimulatedSweep, SimulateSe
 from bushfit.commands.fit import fit
 from bushfit.diagnosis.workflow import diagnose
 from bushfit.effects import BASE
-from bushfit.errors import ModelError
 from bushfit.fitting.master_curve import master_curve
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.procedures import fit_joint
@@ -81,9 +79,6 @@ def test_effects_of_the_campaign_are_in_every_fit(coupons, paper_model):
         assert result.model.effects[3:] == ("stiffness_factor.mount",)
         assert result.model.values["stiffness_factor.mount"] == pytest.approx(1.1, rel=0.01)
         assert result.specimens == (DMA, MOUNT)
-    unknown = replace(data.campaign, fit=FitSettings(effects=("inertai",)))
-    with pytest.raises(ModelError, match=r"epdm.toml, \[fit\] effects: unknown effect[\s\S]*\"inertia\"\?"):
-        joint_fit(unknown)
 
 
 PLAN = SimulateSettings(
