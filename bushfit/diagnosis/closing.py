@@ -223,7 +223,7 @@ def close_gap(search: Search, finding: Finding, hypotheses: Sequence[Hypothesis]
     verdict, reported, data = finding.verdict, finding.reported, search.data
     may_be_wrong = {
         "partly": reported[0].best.levels,
-        "ambiguous": any(composition.faulty_parts or composition.best.claim for composition in reported),
+        "ambiguous": any(composition.faulty_parts or composition.best.mistake for composition in reported),
     }
     certain, amounts = _fit_certain(search, finding, hypotheses)
     fit, gap = base if certain is search.base else with_free_gains(certain, data), None
@@ -246,7 +246,7 @@ def _fit_certain(
         The fit, and the covariance of the amounts that were fixed; None if all were fitted.
     """
     base, bounds, names = search.base, search.data.bounds, finding.names
-    refitted = [h for h in hypotheses if h.refitted and not h.claim and set(h.effects) >= set(names)]
+    refitted = [h for h in hypotheses if h.refitted and not h.mistake and set(h.effects) >= set(names)]
     if not names or not refitted:
         return base, None
     if not finding.reported[0].unnamed:

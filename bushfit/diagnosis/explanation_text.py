@@ -54,9 +54,9 @@ def causes_text(candidates: Sequence[Composition], finding: Finding) -> list[str
         If every reported explanation is a recording mistake, a sentence that asks to check them. Otherwise a sentence
         that there are neither candidates nor leads; else nothing.
     """
-    claims = {c.best.claim.key if c.best.claim else None: c.best.claim for c in finding.reported}
-    if all(claims.values()):
-        return [f"check first whether {' or whether '.join(claim.sentence for claim in claims.values() if claim)}"]
+    mistakes = {c.best.mistake.key if c.best.mistake else None: c.best.mistake for c in finding.reported}
+    if all(mistakes.values()):
+        return [f"check first whether {' or whether '.join(one.sentence for one in mistakes.values() if one)}"]
     return [] if candidates or finding.leads else ["no known effect explains the gap"]
 
 
@@ -80,8 +80,8 @@ def explanation_odds(finding: Finding) -> Odds:
     compositions = sorted(finding.reported, key=lambda composition: -composition.probability)
     sentences, fits = list[str](), list[tuple[Model, Covariance] | None]()
     for composition in compositions:
-        claim = composition.best.claim
-        parts = [claim.sentence] if claim else []
+        mistake = composition.best.mistake
+        parts = [mistake.sentence] if mistake else []
         effects = [get_effect(name) for name in composition.names]
         parts += [f"{effect.phrase} ({' or '.join((effect.name, *effect.twins))})" for effect in effects]
         parts += [f"a faulty test: {part.name}" for part in composition.faulty_parts]
@@ -116,10 +116,10 @@ def list_candidates(
     for hypothesis, share in zip(hypotheses, shares, strict=True):
         for name in {*hypothesis.effects}:
             probability[name] += share
-        if len(hypothesis.key) == 1 and (claim := hypothesis.claim):
+        if len(hypothesis.key) == 1 and (mistake := hypothesis.mistake):
             score = base.chi_square - hypothesis.state.plain.chi_square
             why = "closes the gap" if first and first.best is hypothesis else _LESS_LIKELY
-            candidates.append(CandidateResult(" + ".join(claim.labels), score, score, share, {}, why))
+            candidates.append(CandidateResult(" + ".join(mistake.labels), score, score, share, {}, why))
     for proposal in search.proposals:
         name, after = proposal.name, search.refits.get(proposal.name)
         gain, values = None, dict[str, float]()

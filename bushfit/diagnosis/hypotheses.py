@@ -8,7 +8,6 @@ from functools import cached_property
 
 import numpy as np
 
-from bushfit.diagnosis.claims import Claim
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.explanations import Explanation
 from bushfit.diagnosis.faulty_parts import FaultyPart, OutlierCluster
@@ -17,6 +16,7 @@ from bushfit.diagnosis.linear_model import LinearModel
 from bushfit.diagnosis.priors import LEVELS
 from bushfit.diagnosis.projected_columns import CompoundDeviation, SignatureSet
 from bushfit.diagnosis.recorded_tests import ExplanationColumns, RecordedTests
+from bushfit.diagnosis.recording_mistakes import RecordingMistake
 from bushfit.diagnosis.smooth_deviations import COMPOUND, compound_signature, fast_relaxation
 from bushfit.effects import get_effect, get_parameter, qualified_name
 from bushfit.effects.contract import Array
@@ -67,9 +67,9 @@ class Hypothesis:
         return (*self.state.faulty_parts, *last, *self.clusters)
 
     @property
-    def claim(self) -> Claim | None:
+    def mistake(self) -> RecordingMistake | None:
         """Recording mistake that this hypothesis assumes; None without one."""
-        return self.state.tests.claim
+        return self.state.tests.mistake
 
     @property
     def unnamed(self) -> str:
@@ -80,7 +80,7 @@ class Hypothesis:
     @cached_property
     def key(self) -> frozenset[Hashable]:
         """Names that identify this set of explanations; empty for the hypothesis that nothing is missing."""
-        marks = [self.unnamed, "levels" if self.levels else "", self.claim and self.claim.key]
+        marks = [self.unnamed, "levels" if self.levels else "", self.mistake and self.mistake.key]
         return frozenset((*self.effects, *(part.name for part in self.faulty_parts), *filter(None, marks)))
 
     @property
@@ -169,8 +169,8 @@ class SearchState:
     @cached_property
     def key(self) -> frozenset[Hashable]:
         """Names that identify this search state: effects, faulty parts of the tests, and corrected mistake."""
-        claims = [self.tests.claim.key] if self.tests.claim else []
-        return frozenset((*self.effects, *(part.name for part in self.faulty_parts), *claims))
+        mistakes = [self.tests.mistake.key] if self.tests.mistake else []
+        return frozenset((*self.effects, *(part.name for part in self.faulty_parts), *mistakes))
 
     @cached_property
     def has_influence(self) -> Array:

@@ -8,10 +8,10 @@ from functools import cached_property
 import numpy as np
 
 from bushfit.campaign.schema import RigSettings
-from bushfit.diagnosis.claims import Claim
 from bushfit.diagnosis.explanations import Explanation, Signature
 from bushfit.diagnosis.faulty_parts import FaultyPart, find_faulty_parts
 from bushfit.diagnosis.projected_columns import CompoundDeviation, SignatureSet
+from bushfit.diagnosis.recording_mistakes import RecordingMistake
 from bushfit.diagnosis.rig_errors import RigErrors, in_scatter_units, rig_errors
 from bushfit.diagnosis.smooth_deviations import POWER_LAW, compound_signature, power_laws, unnamed_curves
 from bushfit.effects.contract import Array
@@ -36,7 +36,7 @@ class RecordedTests:
         deviation: changes of the residuals if the rubber deviates smoothly from the model's laws; None if the tests
             cannot show any.
         log_odds: natural log of the prior odds of the corrected mistake; 0 for the tests as recorded.
-        claim: mistake that is corrected; None for the tests as recorded.
+        mistake: mistake that is corrected; None for the tests as recorded.
         change: relative change of the recorded quantities due to the correction; 0 for the tests as recorded.
     """
 
@@ -46,24 +46,19 @@ class RecordedTests:
     errors: RigErrors
     deviation: Signature | None
     log_odds: float = 0.0
-    claim: Claim | None = None
+    mistake: RecordingMistake | None = None
     change: float = 0.0
 
     @classmethod
-    def of_fit(
-        cls, base: FitResult, rig: RigSettings, log_odds: float = 0.0, claim: Claim | None = None, change: float = 0.0
-    ) -> RecordedTests:
+    def of_fit(cls, base: FitResult, rig: RigSettings) -> RecordedTests:
         """Build the tests from a fit of the starting model.
 
         Args:
             base: fit of the starting model to the tests, as recorded or with a mistake corrected.
             rig: accuracy class of the rig: its stated gain and phase errors.
-            log_odds: natural log of the prior odds of the corrected mistake; 0 for the tests as recorded.
-            claim: mistake that is corrected; None for the tests as recorded.
-            change: largest relative change of a recorded quantity in the correction; 0 for the tests as recorded.
         """
         fit = in_scatter_units(base)
-        return cls(base, fit, rig, rig_errors(fit, rig), compound_signature(fit), log_odds, claim, change)
+        return cls(base, fit, rig, rig_errors(fit, rig), compound_signature(fit))
 
     @cached_property
     def columns(self) -> ExplanationColumns:

@@ -78,8 +78,8 @@ class DiagnosisWriter:
         first, verdict = self.first, self.finding.verdict
         if first is None:
             return self._build(Closing(self.base), _NOTHING)
-        mistakes = {composition.best.claim and composition.best.claim.key for composition in self.finding.reported}
-        if verdict in ("named", "partly", "ambiguous") and first.best.claim and len(mistakes) == 1:
+        mistakes = {reported.best.mistake and reported.best.mistake.key for reported in self.finding.reported}
+        if verdict in ("named", "partly", "ambiguous") and first.best.mistake and len(mistakes) == 1:
             return self._record_diagnosis(first)
         closing = close_gap(self.search, self.finding, self.hypotheses, self.base)
         if verdict in ("named", "partly"):
@@ -133,16 +133,16 @@ class DiagnosisWriter:
 
     def _record_diagnosis(self, first: Composition) -> Diagnosis:
         """Diagnosis in which a recording mistake explains the gap; the model to use remains the starting model."""
-        best, claim, base = first.best, first.best.claim, self.base
-        assert claim is not None
-        advice = f"if the records of the tests confirm this mistake, correct {'; '.join(claim.corrections)}"
-        summary = f"probable mistake in the record: {claim.sentence}"
+        best, mistake, base = first.best, first.best.mistake, self.base
+        assert mistake is not None
+        advice = f"if the records of the tests confirm this mistake, correct {'; '.join(mistake.corrections)}"
+        summary = f"probable mistake in the record: {mistake.sentence}"
         if self.finding.verdict == "ambiguous":
             summary += "; correct this first: the tests do not decide yet what else is missing"
         after = with_free_gains(best.state.plain, self.search.data)
         closing = Closing(base, holdout=hold_out(base, after, self.search.data.bounds))
         diagnosis = self._build(closing, summary, self._record_entries(first), places=best, next_test=advice)
-        warning = Caveat("mistaken_record", f"fitted to the tests as they are; probable mistake: {claim.sentence}")
+        warning = Caveat("mistaken_record", f"fitted to the tests as they are; probable mistake: {mistake.sentence}")
         result = replace(diagnosis.result, warnings=(*diagnosis.result.warnings, warning))
         return replace(diagnosis, after=after, remainder=find_regions(after), result=result)
 
@@ -202,8 +202,8 @@ class DiagnosisWriter:
 
         An effect with a twin may be in the rig as well.
         """
-        if (claim := leader.best.claim) and leader is self.first:
-            return f"check the records of the tests; {'; '.join(claim.corrections)}"
+        if (mistake := leader.best.mistake) and leader is self.first:
+            return f"check the records of the tests; {'; '.join(mistake.corrections)}"
         fitted = [c for c in self.finding.reported if c.best.effects and c.best.refitted]
         models, odds = list[Model](), list[float]()
         for composition in fitted:
@@ -222,14 +222,14 @@ class DiagnosisWriter:
             composition: the explanation.
             alternatives: explanations that the tests cannot distinguish from this one.
         """
-        if (claim := composition.best.claim) is None:
+        if (mistake := composition.best.mistake) is None:
             return []
         gain = self.search.base.chi_square - composition.best.state.plain.chi_square
         why = f"lowers chi-square by {gain:.0f} without a new parameter; {probability_text(composition, self.finding)}"
-        singles = [replace(claim, tests=(index,)) for index in claim.tests] or [claim]
+        singles = [replace(mistake, tests=(index,)) for index in mistake.tests] or [mistake]
         return [
             NamedCause(
-                single.mistake.name,
+                single.kind.name,
                 why,
                 alternatives,
                 test=next((test.name for test in single.affected), None),
@@ -274,7 +274,7 @@ class DiagnosisWriter:
             after,
             bounds,
             {*base.model.effects} - {*search.settings.unresolved},
-            lacking=self.finding.verdict == "ambiguous" or not (self.first and self.first.best.claim),
+            lacking=self.finding.verdict == "ambiguous" or not (self.first and self.first.best.mistake),
             corrected=gap.fitted if gap else None,
             rig=search.data.campaign.rig,
             fixed=closing.fixed_amounts,

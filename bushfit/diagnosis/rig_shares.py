@@ -52,7 +52,7 @@ def with_alternatives(result: Result, hypotheses: Sequence[Hypothesis], base: Fi
         is_large = hypothesis.change > tolerance
         effects = _rig_effects(hypothesis.effects if is_large else ())
         probability[effects] += share
-        if is_large and hypothesis.refitted and not hypothesis.claim:
+        if is_large and hypothesis.refitted and not hypothesis.mistake:
             members[effects].append(hypothesis)
     current = _rig_effects(result.model.effects) - {*base.model.effects}
     places = {str(test.direction): test.direction for test in base.data_sets}

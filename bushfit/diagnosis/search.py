@@ -17,7 +17,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bushfit.diagnosis.claims import ClaimScreening, claims
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.explanations import Explanation
 from bushfit.diagnosis.faulty_parts import FaultyPart, OutlierCluster
@@ -28,6 +27,7 @@ from bushfit.diagnosis.projected_columns import SignatureSet
 from bushfit.diagnosis.propose import Proposal, has_used_parameters, proposals
 from bushfit.diagnosis.record import DiagnosisSettings
 from bushfit.diagnosis.recorded_tests import RecordedTests, modulus_deviation, record_change
+from bushfit.diagnosis.recording_mistakes import MistakeScreening, possible_mistakes
 from bushfit.diagnosis.smooth_deviations import COMPOUND, POWER_LAW
 from bushfit.diagnosis.verdict import decide_verdict
 from bushfit.effects.mistakes import get_mistake
@@ -40,7 +40,7 @@ from bushfit.progress import track
 _LAST_REFITS = 8
 #: Number of mistakes that are fitted, and that are combined with effects in each round, the most promising first; and
 #: number of faulty parts added to a state; for time.
-_CLAIMS, _CORRECTED, _FAULTY_PARTS = 4, 2, 2
+_MISTAKES, _CORRECTED, _FAULTY_PARTS = 4, 2, 2
 #: Natural log of the odds below its state within which an effect is refitted; for time.
 _SLIGHT = 3.0
 #: Number of rivals that are refitted from the values of the most probable state in each round; for time.
@@ -145,8 +145,8 @@ class Search:
             beam = [state for state in nearest[: BEAM[min(depth, 1)]] if state.log_posterior > limit]
             corrected = dict[tuple[int, ...], SearchState]()  # the most probable one with a mistake in these tests
             for state in nearest:
-                if state.tests.claim:
-                    corrected.setdefault(state.tests.claim.tests, state)
+                if state.tests.mistake:
+                    corrected.setdefault(state.tests.mistake.tests, state)
             for state in [*corrected.values()][:_CORRECTED]:
                 if state not in beam and self._is_improved(state):
                     beam.append(state)  # because neither explains tests that have a mistake and an effect
@@ -208,8 +208,8 @@ class Search:
 
     def _is_improved(self, corrected: SearchState) -> bool:
         """True if the same explanations are more probable with a recording mistake corrected than without."""
-        assert corrected.tests.claim
-        uncorrected = self._known.get(corrected.key - {corrected.tests.claim.key})
+        assert corrected.tests.mistake
+        uncorrected = self._known.get(corrected.key - {corrected.tests.mistake.key})
         return uncorrected is None or corrected.log_posterior > uncorrected.state.log_posterior
 
     def _visit(self, state: SearchState) -> SearchState:
@@ -365,15 +365,16 @@ class Search:
 
     def _corrected_records(self) -> Iterator[SearchState]:
         """Generate states in which one recording mistake is corrected, the most promising first."""
-        possible = claims(self.data, self.settings.without)
-        for claim in track("mistakes corrected", list(ClaimScreening(self.data).best(possible, _CLAIMS))):
+        possible = possible_mistakes(self.data, self.settings.without)
+        for mistake in track("mistakes corrected", list(MistakeScreening(self.data).best(possible, _MISTAKES))):
             with suppress(FitError, ModelError):  # the model cannot be fitted to the corrected tests
-                fit = self.fit_corrected(claim.corrected())
+                fit = self.fit_corrected(mistake.corrected())
                 if [test.size for test in fit.data_sets] == [test.size for test in self.base.data_sets]:
                     log_odds = log(ODDS["record"] / len(possible))
                     log_odds -= 0.5 * (modulus_deviation(fit) ** 2 - modulus_deviation(self.base) ** 2)
                     change = record_change(self.base, fit)
-                    tests = RecordedTests.of_fit(fit, self.data.campaign.rig, log_odds, claim, change)
+                    tests = RecordedTests.of_fit(fit, self.data.campaign.rig)
+                    tests = replace(tests, log_odds=log_odds, mistake=mistake, change=change)
                     yield self._visit(SearchState.of_tests(tests))
 
 

@@ -56,8 +56,8 @@ class Composition:
     @property
     def labels(self) -> tuple[str, ...]:
         """Names of all components: recording mistake (as --adopt accepts it), effects, faults, smooth curves."""
-        claim, faults = self.best.claim, (f"fault: {part.name}" for part in self.faulty_parts)
-        return (*(claim.labels if claim else ()), *self.names, *faults, *self.nameless)
+        mistake, faults = self.best.mistake, (f"fault: {part.name}" for part in self.faulty_parts)
+        return (*(mistake.labels if mistake else ()), *self.names, *faults, *self.nameless)
 
     @property
     def label(self) -> str:
@@ -72,7 +72,7 @@ class Composition:
     @property
     def causes(self) -> tuple[str, ...]:
         """Names of the recording mistake and of the effects of the explanation."""
-        return (*([str(self.best.claim.mistake.name)] if self.best.claim else []), *self.names)
+        return (*([str(self.best.mistake.kind.name)] if self.best.mistake else []), *self.names)
 
     @property
     def components(self) -> frozenset[str]:
@@ -171,10 +171,10 @@ def _verdict_on_components(likely: Sequence[Composition], nothing: float, leads:
     curve = best.unnamed not in ("", COMPOUND) and best.last_change >= (1.0 - LEAST_NAMED_SHARE) * best.change
     # a mistake must close the gap without effects of the rig; effects of the rubber are permitted
     rig_effects = any(get_effect(name).level != Level.MATERIAL for name in best.effects)
-    compensated = best.claim and (rig_effects or best.faulty_parts)
+    compensated = best.mistake and (rig_effects or best.faulty_parts)
     if not first.causes or curve or compensated or not fits:
         return Finding("described", nothing, reported, leads)
-    partly = first.unnamed or best.levels or first.faulty_parts or (best.claim and best.effects)
+    partly = first.unnamed or best.levels or first.faulty_parts or (best.mistake and best.effects)
     return Finding("partly" if partly else "named", nothing, reported, leads, first.names)
 
 
@@ -212,7 +212,7 @@ def _components_of(hypothesis: Hypothesis) -> frozenset[_Component]:
     if not pattern:
         components += [(f"{_FAULT}{part.family}", part.name) for part in hypothesis.faulty_parts]
         components += [(f"{_FAULT}levels", "")] * hypothesis.levels
-    components += [("mistake", hypothesis.claim.key)] if hypothesis.claim else []
+    components += [("mistake", hypothesis.mistake.key)] if hypothesis.mistake else []
     return frozenset(components or ([("unnamed", "")] if pattern or hypothesis.unnamed else []))
 
 

@@ -8,12 +8,12 @@ from dataclasses import replace
 from functools import partial
 
 from bushfit.caveat import Caveat
-from bushfit.diagnosis.claims import ClaimScreening, claims, correct_adopted
 from bushfit.diagnosis.closing import with_free_gains
 from bushfit.diagnosis.condense import shorten_tests
 from bushfit.diagnosis.faulty_parts import outlier_clusters
 from bushfit.diagnosis.fits import EVALUATIONS
 from bushfit.diagnosis.record import Diagnosis, DiagnosisSettings
+from bushfit.diagnosis.recording_mistakes import MistakeScreening, correct_adopted, possible_mistakes
 from bushfit.diagnosis.report_text import DiagnosisWriter
 from bushfit.diagnosis.search import Search
 from bushfit.diagnosis.verdict import decide_verdict
@@ -65,10 +65,10 @@ def diagnose(
         try:
             base, start, outliers = refit(data)
         except FitError as error:
-            thousands = [claim for claim in claims(data, settings.without) if claim.mistake.scales]
-            for claim in ClaimScreening(data).best(thousands, 1):
-                adopted = " --adopt ".join(map(quote_path, claim.labels))
-                error.hint = f"probable mistake in the record: {claim.sentence}; --adopt {adopted} corrects it"
+            thousands = [mistake for mistake in possible_mistakes(data, settings.without) if mistake.kind.scales]
+            for mistake in MistakeScreening(data).best(thousands, 1):
+                adopted = " --adopt ".join(map(quote_path, mistake.labels))
+                error.hint = f"probable mistake in the record: {mistake.sentence}; --adopt {adopted} corrects it"
             raise
         known_rows = {(outlier.test, outlier.row) for outlier in excluded}  # a robust fit finds them anew
         candidates = (*outliers, *list_outliers(base.model, split_by_kind(base.data_sets)[1]))

@@ -110,7 +110,7 @@ def test_a_parameter_without_influence_is_left_out(measured, fitted):
     """The effect of preload changes no test without a preload; intervals of the others exist as without it."""
     names = []
     for effects in ((), ("preload",)):
-        state = SearchState.of_tests(RecordedTests.of_fit(fitted(measured(plan=SHARED), *effects), SHARED_RIG, 0.0))
+        state = SearchState.of_tests(RecordedTests.of_fit(fitted(measured(plan=SHARED), *effects), SHARED_RIG))
         means, covariance = state.parameters
         names.append(covariance.names)
         assert np.isfinite(covariance.matrix).all()

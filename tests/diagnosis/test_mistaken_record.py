@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from rigged import SHARED, Tamper, asked, said
 from tries import some
 
-from bushfit.diagnosis.claims import ClaimScreening, claims
+from bushfit.diagnosis.recording_mistakes import MistakeScreening, possible_mistakes
 from bushfit.effects.mistakes import MISTAKES
 from bushfit.errors import FitError
 from bushfit.fitting.prepared_campaign import PreparedCampaign
@@ -116,9 +116,9 @@ def test_of_the_corrections_of_the_same_tests_those_far_behind_leave_room_for_ot
     """Rates of one loop often fit a rubber of another law by chance; they must not crowd out amplitudes of sweeps."""
     data = PreparedCampaign.from_campaign(measured(None, SHARED))
     misfits = {"sixty_times_faster": 30.0, "ten_times_faster": 50.0, "peak_to_peak": 90.0}
-    monkeypatch.setattr(ClaimScreening, "misfit", lambda _, c: misfits[c.mistake.name] if c else 100.0)
-    possible = [claim for claim in claims(data, ()) if claim.mistake.name in misfits and len(claim.tests) == 1]
-    selected = {claim.labels for claim in ClaimScreening(data).best(possible, 9)}
+    monkeypatch.setattr(MistakeScreening, "misfit", lambda _, c: misfits[c.kind.name] if c else 100.0)
+    possible = [each for each in possible_mistakes(data, ()) if each.kind.name in misfits and len(each.tests) == 1]
+    selected = {mistake.labels for mistake in MistakeScreening(data).best(possible, 9)}
     assert ("peak_to_peak:sweep_axial",) in selected
     assert ("sixty_times_faster:loop_axial_1",) in selected
     assert ("ten_times_faster:loop_axial_1",) not in selected

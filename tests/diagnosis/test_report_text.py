@@ -144,10 +144,10 @@ def one(parts: str, odds: float, *, size: float = 0.05, last: float = 0.0, p_val
         )
         for family, name in spots
     )
-    claims: list[Any] = [SimpleNamespace(mistake=MISTAKES[name], key=name) for name in names if name in MISTAKES]
+    mistakes: list[Any] = [SimpleNamespace(kind=MISTAKES[name], key=name) for name in names if name in MISTAKES]
     others = {"unnamed", "compound", "levels", *MISTAKES}
     effects = tuple(name for name in names if ":" not in name and name not in others)
-    tests = SimpleNamespace(claim=claims[0] if claims else None)
+    tests = SimpleNamespace(mistake=mistakes[0] if mistakes else None)
     linear = SimpleNamespace(p_value=lambda **_: p_value)
     state: Any = SimpleNamespace(effects=effects, faulty_parts=places, tests=tests, linear=linear)
     curve = Explanation("unnamed", "unnamed", "smooth all", None) if "unnamed" in names else None

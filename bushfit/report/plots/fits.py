@@ -191,8 +191,8 @@ def _draw_forces(axes: Axes, place: Place, loops: dict[str, pd.DataFrame], looks
         counted = loop[loop["outlier"] == "no"]
         drawn = counted.iloc[_drawn_rows(counted)]
         modelled = scale * drawn[f"model {force}"].to_numpy()
-        turns = drawn["time [s]"] * drawn["frequency [Hz]"]
-        modelled[1:][np.diff(turns) > 0.5] = np.nan  # no line from the first cycles to the last
+        cycles = drawn["time [s]"] * drawn["frequency [Hz]"]
+        modelled[1:][np.diff(cycles) > 0.5] = np.nan  # no line from the first cycles to the last
         axes.plot(drawn[motion], scale * drawn[force], "o", color=look.color, alpha=0.5, **style.DOT)
         axes.plot(drawn[motion], modelled, color=style.INK, lw=0.8)
     rows = pd.concat(loops.values())
@@ -222,6 +222,6 @@ def loop_labels(place: Place, loops: dict[str, pd.DataFrame]) -> list[str]:
 
 def _drawn_rows(loop: pd.DataFrame) -> Array:
     """Indices of the rows of a loop to draw, (n,): about 240 at most, from the first two and last two cycles."""
-    turns = (loop["time [s]"] * loop["frequency [Hz]"]).to_numpy()
-    rows = np.flatnonzero((turns < turns[0] + 2.0) | (turns > turns[-1] - 2.0))
+    cycles = (loop["time [s]"] * loop["frequency [Hz]"]).to_numpy()
+    rows = np.flatnonzero((cycles < cycles[0] + 2.0) | (cycles > cycles[-1] - 2.0))
     return rows[:: max(1, -(-rows.size // _MOST_ROWS))]

@@ -179,6 +179,6 @@ def draw_sector_means(axes: Axes, loop: pd.DataFrame, place: Place, header: str,
 
 def phase_after_turn(loop: pd.DataFrame, place: Place) -> Array:
     """Phase of each row of a loop [deg], (n,), from 0 at the peak of the motion up to 360."""
-    turns = (loop["time [s]"] * loop["frequency [Hz]"]).to_numpy()
-    _, fundamental, _ = cycle_harmonics(turns, loop[[displacement_header(place)]].to_numpy(), order=1)
-    return np.asarray(360.0 * ((turns + np.angle(fundamental[0]) / (2.0 * np.pi)) % 1.0))
+    cycles = (loop["time [s]"] * loop["frequency [Hz]"]).to_numpy()
+    _, fundamental, _ = cycle_harmonics(cycles, loop[[displacement_header(place)]].to_numpy(), order=1)
+    return np.asarray(360.0 * ((cycles + np.angle(fundamental[0]) / (2.0 * np.pi)) % 1.0))

@@ -157,7 +157,7 @@ class Chart(Figure):
 
 
 class Style(NamedTuple):
-    """Look of one curve (of an amplitude, frequency, temperature or loop) in a figure.
+    """Line style of one curve (of an amplitude, frequency, temperature or loop) in a figure.
 
     Args:
         color, dashes, marker: colour, line style and marker, as matplotlib takes them.

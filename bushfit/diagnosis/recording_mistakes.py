@@ -1,8 +1,8 @@
 """Mistakes in the record of a campaign (wrong units, conventions, dimensions), and the misfit without them.
 
-A claim is the hypothesis that one mistake was made. A mistake has no free parameter, so its only penalty is the
-logarithm of the number of mistakes considered. A mistake is reported if its correction closes the whole gap and if it
-is more probable than every effect and every fault. The user decides whether to correct it.
+A mistake has no free parameter, so its only penalty is the logarithm of the number of mistakes considered. A mistake is
+reported if its correction closes the whole gap and if it is more probable than every effect and every fault. The user
+decides whether to correct it.
 """
 
 from __future__ import annotations
@@ -45,23 +45,23 @@ _RIDGE = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
-class Claim:
-    """Hypothesis of one recording mistake: a wrong unit, convention or dimension in some tests or in [bushing].
+class RecordingMistake:
+    """Possible recording mistake: a wrong unit, convention or dimension in some tests or in [bushing].
 
     Args:
         data: the campaign as it was read.
-        mistake: kind of mistake, such as amplitudes stated peak-to-peak, with its correction.
+        kind: kind of mistake, such as amplitudes stated peak-to-peak, with its correction.
         tests: indices of the affected tests, loops before sweeps; empty for a mistake in [bushing].
     """
 
     data: PreparedCampaign
-    mistake: Mistake
+    kind: Mistake
     tests: tuple[int, ...]
 
     @property
     def key(self) -> tuple[str, tuple[int, ...]]:
-        """Name of the mistake and indices of the affected tests, which identify the claim."""
-        return self.mistake.name, self.tests
+        """Name of the kind and indices of the affected tests, which identify the mistake."""
+        return self.kind.name, self.tests
 
     @property
     def affected(self) -> list[MeasuredTest]:
@@ -71,8 +71,8 @@ class Claim:
     @property
     def labels(self) -> tuple[str, ...]:
         """Values of the option --adopt that correct the mistake, "mistake:test" for each affected test."""
-        labels = tuple(option_label(self.mistake.name, test.name) for test in self.affected)
-        return labels or (self.mistake.name,)
+        labels = tuple(option_label(self.kind.name, test.name) for test in self.affected)
+        return labels or (self.kind.name,)
 
     @property
     def sentence(self) -> str:
@@ -80,13 +80,13 @@ class Claim:
         files = [file_or_name(test.test) for test in self.affected]
         if len({*files}) < len(files):
             files = [test.name for test in self.affected]
-        return self.mistake.sentence.format(files=join_names(files))
+        return self.kind.sentence.format(files=join_names(files))
 
     @property
     def corrections(self) -> tuple[str, ...]:
         """Lines to write into the campaign file to correct the mistake, one for each affected test."""
-        return tuple(self.mistake.correction_line(test.test) for test in self.affected) or (
-            self.mistake.correction_line(None),
+        return tuple(self.kind.correction_line(test.test) for test in self.affected) or (
+            self.kind.correction_line(None),
         )
 
     def corrected(self) -> PreparedCampaign:
@@ -97,11 +97,11 @@ class Claim:
         """
         data = self.data
         if not self.tests:
-            bushing = data.campaign.bushing and self.mistake.corrected_bushing(data.campaign.bushing)
+            bushing = data.campaign.bushing and self.kind.corrected_bushing(data.campaign.bushing)
             return replace(data, campaign=replace(data.campaign, bushing=bushing)).with_rubber_conditions()
         loops, sweeps, count = list(data.loops), [sweep.test for sweep in data.sweeps], len(data.loops)
         for index, affected in zip(self.tests, self.affected, strict=True):
-            test = self.mistake.corrected_test(affected.test)
+            test = self.kind.corrected_test(affected.test)
             if isinstance(test, Loop):
                 loops[index] = prepare_loops([test], data.campaign.rig, without_outliers=data.robust)[0]
             elif isinstance(test, Sweep):
@@ -127,22 +127,22 @@ def correct_adopted(data: PreparedCampaign, names: Collection[str]) -> tuple[Pre
     """
     messages = []
     for name in names:
-        mistake = get_mistake(name)
-        possible = {claim.labels: claim for claim in claims(data, ()) if claim.mistake is mistake}
-        if (claim := possible.get((name,))) is None:
+        kind = get_mistake(name)
+        possible = {mistake.labels: mistake for mistake in possible_mistakes(data, ()) if mistake.kind is kind}
+        if (mistake := possible.get((name,))) is None:
             expected = ", ".join(labels[0] for labels in possible if len(labels) == 1)
             raise ModelError(
                 "this mistake is not possible in this test",
                 found=name,
                 expected=f"one of {expected}" if expected else "another mistake: this one is not possible in any test",
             )
-        sentence = f"read as if {claim.sentence}; {claim.corrections[0]}"
+        sentence = f"read as if {mistake.sentence}; {mistake.corrections[0]}"
         messages.append(Caveat("corrected_record", sentence).about(f"corrected by --adopt {name}"))
-        data = claim.corrected()
+        data = mistake.corrected()
     return data, messages
 
 
-def claims(data: PreparedCampaign, without: Collection[str]) -> list[Claim]:
+def possible_mistakes(data: PreparedCampaign, without: Collection[str]) -> list[RecordingMistake]:
     """List possible recording mistakes, each in one test, in all tests of one kind or direction, or in all tests.
 
     Args:
@@ -150,36 +150,36 @@ def claims(data: PreparedCampaign, without: Collection[str]) -> list[Claim]:
         without: values of the option --without, "mistake" or "mistake:test", which are left out.
 
     Returns:
-        Hypotheses without duplicates.
+        Mistakes without duplicates.
     """
-    data_sets, bushing, found = data.data_sets, data.campaign.bushing, list[Claim]()
+    data_sets, bushing, found = data.data_sets, data.campaign.bushing, list[RecordingMistake]()
     shared = [(data_set.kind, data_set.direction) for data_set in data_sets]
-    marks = dict.fromkeys([*(kind for kind, _ in shared), *(place for _, place in shared)])
+    marks = dict.fromkeys([*(test_kind for test_kind, _ in shared), *(place for _, place in shared)])
     moduli = [np.median(np.abs(x.measured)) / stiffness_per_modulus(bushing, x.direction) for x in data_sets]
     strains = [np.max(x.amplitude) * unit_strain(bushing, x.direction) for x in data_sets]
-    for mistake in MISTAKES.values():
-        if mistake.name in without:
+    for kind in MISTAKES.values():
+        if kind.name in without:
             continue
-        if not mistake.kinds:
+        if not kind.kinds:
             with suppress(ModelError):  # no bushing has the corrected dimensions
-                if bushing and mistake.corrected_bushing(bushing) != bushing:
-                    found.append(Claim(data, mistake, ()))
+                if bushing and kind.corrected_bushing(bushing) != bushing:
+                    found.append(RecordingMistake(data, kind, ()))
             continue
         indices = [
             index
             for index, data_set in enumerate(data_sets)
-            if option_label(mistake.name, data_set.name) not in without
-            and mistake.possible(data_set.test)
-            and mistake.explains(data_set.test, float(moduli[index]), float(strains[index]))
+            if option_label(kind.name, data_set.name) not in without
+            and kind.possible(data_set.test)
+            and kind.explains(data_set.test, float(moduli[index]), float(strains[index]))
         ]
         groups: list[tuple[int, ...]] = [(index,) for index in indices]
         groups += [tuple(index for index in indices if mark in shared[index]) for mark in marks]
-        found += [Claim(data, mistake, group) for group in dict.fromkeys([*groups, tuple(indices)]) if group]
+        found += [RecordingMistake(data, kind, group) for group in dict.fromkeys([*groups, tuple(indices)]) if group]
     return found
 
 
 @dataclass(frozen=True, eq=False)
-class ClaimScreening:
+class MistakeScreening:
     """Screening of recording mistakes by the misfit of the five-parameter model to the corrected tests.
 
     Args:
@@ -193,45 +193,45 @@ class ClaimScreening:
     data: PreparedCampaign
     _products: dict[tuple[int, str, Bushing | None], Array] = field(default_factory=dict)
 
-    def best(self, candidates: Sequence[Claim], limit: int) -> list[Claim]:
+    def best(self, candidates: Sequence[RecordingMistake], limit: int) -> list[RecordingMistake]:
         """Select the recording mistakes whose correction lowers the misfit of a coarse fit most, the best first.
 
         A correction that leaves the misfit as it is, such as one common factor of all stiffnesses, is not selected, nor
         is one that another correction of the same tests surpasses.
 
         Args:
-            candidates: hypotheses of mistakes to compare.
+            candidates: mistakes to compare.
             limit: maximum number of mistakes to select.
 
         Returns:
             At most `limit` mistakes, by increasing misfit after correction.
         """
-        before, misfits = self.misfit(None), np.array([self.misfit(claim) for claim in candidates])
+        before, misfits = self.misfit(None), np.array([self.misfit(mistake) for mistake in candidates])
         changed = np.abs(misfits - before) > _LEAST_CHANGE * before
-        best_of_tests, selected = dict[tuple[int, ...], float](), list[Claim]()
+        smallest, selected = dict[tuple[int, ...], float](), list[RecordingMistake]()
         for index in np.argsort(misfits, kind="stable"):
-            claim, misfit = candidates[index], float(misfits[index])
-            if changed[index] and misfit < _LARGEST_RATIO * min(before, best_of_tests.setdefault(claim.tests, misfit)):
-                selected.append(claim)
+            mistake, misfit = candidates[index], float(misfits[index])
+            if changed[index] and misfit < _LARGEST_RATIO * min(before, smallest.setdefault(mistake.tests, misfit)):
+                selected.append(mistake)
         return selected[:limit]
 
-    def misfit(self, claim: Claim | None) -> float:
+    def misfit(self, mistake: RecordingMistake | None) -> float:
         """Smallest sum of squared residuals of the five-parameter model (mu, m, alpha, sigma_fmax, eps_half).
 
         Args:
-            claim: mistake that is corrected first; None for the tests as recorded.
+            mistake: mistake that is corrected first; None for the tests as recorded.
 
         Returns:
             Sum of squared differences of the complex stiffness, divided by a coarse noise; infinite if the model has no
             finite response.
         """
         bushing = self.data.campaign.bushing
-        if claim and not claim.tests and bushing:
-            bushing = claim.mistake.corrected_bushing(bushing)
+        if mistake and not mistake.tests and bushing:
+            bushing = mistake.kind.corrected_bushing(bushing)
         data_sets = self.data.data_sets
-        mistakes = [claim.mistake if claim and index in claim.tests else None for index in range(len(data_sets))]
+        kinds = [mistake.kind if mistake and index in mistake.tests else None for index in range(len(data_sets))]
         try:
-            parts = [self._test_products(index, test, mistakes[index], bushing) for index, test in enumerate(data_sets)]
+            parts = [self._test_products(index, test, kinds[index], bushing) for index, test in enumerate(data_sets)]
         except ModelError:  # a shape for which a formula was not checked
             return np.inf
         whole = np.sum(parts, axis=0)
