@@ -19,12 +19,13 @@ from bushfit.campaign.strain import with_strain_checked
 from bushfit.campaign.toml import parse_toml
 from bushfit.caveat import join_names
 from bushfit.effects import effect_name_of, place_suffix, with_base
-from bushfit.errors import CampaignError, error_location, quote_path
+from bushfit.errors import CampaignError, MeasurementError, error_location, quote_path
 from bushfit.geometry import Bushing, Direction, Place, Specimen, get_places
 from bushfit.model.laws import register_file
 from bushfit.model.model import FIVE, Model
 from bushfit.model.transfer import FACTOR_SPREAD
 from bushfit.progress import track
+from bushfit.reading.files import view_bytes
 from bushfit.reading.finding import direction_of_table, find_table
 from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS, ZERO_TO_PEAK, split_convention
 from bushfit.reading.instruments import RECORDINGS
@@ -300,6 +301,9 @@ def reader_keywords(
         listed_tests.add(identity)
         shared = counts[source] > 1
         keywords: dict[str, Any] = {"file": path.parent / test.file, "test": test, "name": name, "shared": shared}
+        if not os.path.exists(keywords["file"]):  # noqa: PTH110  # Path.exists raises an error for a long name
+            with error_location(place=f"named in {path}, relative to its folder"):
+                view_bytes(keywords["file"], MeasurementError)
         if test.direction is None and test.specimen is None:
             names_of = SWEEP_COLUMNS if isinstance(test, SweepFile) else LOOP_COLUMNS
             table = find_table(keywords["file"], names_of, test.columns, test.units, test)

@@ -141,10 +141,11 @@ def _print_result(output: Output, result: BatchResult, folder: Path) -> None:
         scatter = format_aligned([quantity.sigma], 2)[0] if quantity.parts > 1 and quantity.sigma else ""
         indices = ["" if index is None else number(index[0], 3) for index in (quantity.cp, quantity.cpk)]
         rows.append((name, format_aligned([quantity.median], 4)[0], scatter, unit or "-", *indices))
-    columns = ("quantity", "median", "robust std dev", "unit", "Cp, all parts", "Cpk, all parts")
+    columns = ("quantity", "median", "robust std dev", "unit", "Cp, with outliers", "Cpk, with outliers")
     column_count = len(columns) if any(row[-1] for row in rows) else 4
     if rows:
         counted = f"{document.title}: {document.done} bushing{'s' * (document.done > 1)}"
+        counted += ", too few to show whether one differs" * (document.done > 1 and not document.detectable)
         output.print_table(counted, columns[:column_count], [row[:column_count] for row in rows])
     from_before = f", {result.kept_count} of them from an earlier run" if result.kept_count else ""
     errors = f"{len(document.failed)} with an error"

@@ -121,6 +121,8 @@ def print_verdict(output: Output, diagnosed: DiagnosisOutput, again: str, action
         adopted = "".join(f" --adopt {quote_path(label)}" for label in labels)
         source = "the records" if any(effect["correction"] for effect in diagnosed.document["effects"]) else "tests"
         lines.append(f"if {source} confirm {join_names(labels)}: {again}{adopted}")
+        if diagnosed.diagnosis.verdict == "ambiguous":
+            lines.append(f"if {source} exclude {join_names(labels)}: {again}{adopted.replace('--adopt', '--without')}")
     for line in lines:
         output.console.print(f"  {escape(line)}")
 

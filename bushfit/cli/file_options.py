@@ -113,7 +113,7 @@ def require_tests(context: click.Context, _: click.Parameter, value: Any) -> Any
             view_bytes(file, MeasurementError)
         start, found = _NO_TESTS.get(file.suffix.lower(), (b"", ""))
         if found and file.is_file() and re.match(start, view_bytes(file, MeasurementError)):
-            hint = "bushfit diagnose looks at all tests of a campaign together; name its files, or their folder, here"
+            hint = "name a table or a recording here; to evaluate a campaign: bushfit run CAMPAIGN"
             raise MeasurementError("a test file is needed", file=file, found=found, expected="a table", hint=hint)
     return value
 

@@ -24,7 +24,7 @@ from rich.table import Table
 
 from bushfit.caveat import GENERAL, Caveat
 from bushfit.cli.options import Folder, Parameter, flag, option, option_group
-from bushfit.errors import OutputError, printable
+from bushfit.errors import OutputError, printable, quote_path
 from bushfit.progress import report_progress_to
 from bushfit.reading.tablefile import Form, folder_name
 from bushfit.report.results import Formats, Picture, ResultFile, check_free, to_json, write_results
@@ -134,16 +134,16 @@ class Output:
         check_free(folder, files, overwrite=self.force)
         return folder
 
-    @staticmethod
-    def command(arguments: str, name: str) -> str:
-        """Command line of bushfit to print as the next step, with --force if its default results folder exists.
+    def command(self, arguments: str, name: str) -> str:
+        """Command line of bushfit to print as the next step: its results below --output, and --force if needed.
 
         Args:
             arguments: name of the command, its arguments and options.
             name: name of the result, which names the default folder.
         """
-        folder = Path("results", folder_name(name), arguments.split()[0])
-        return f"bushfit {arguments}{' --force' * folder.exists()}"
+        folder = (self.output or Path("results", folder_name(name))) / arguments.split()[0]
+        place = f" -o {quote_path(folder)}" if self.output else ""
+        return f"bushfit {arguments}{place}{' --force' * folder.exists()}"
 
     def print(self, text: str) -> None:
         """Print a line of the result without interpreting markup."""

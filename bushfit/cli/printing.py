@@ -82,7 +82,7 @@ def print_result(output: Output, title: str, result: Result) -> None:
 
 
 def print_tests(output: Output, misfits: Sequence[Misfit], usable: Sequence[ExpectedError]) -> None:
-    """Print the misfit of each test, with -v also of each run, and the expected error of the model.
+    """Print the misfit of each test, with -v also of each run, and how far single measured points are from the model.
 
     Args:
         output: output of the command.
@@ -109,7 +109,7 @@ def print_tests(output: Output, misfits: Sequence[Misfit], usable: Sequence[Expe
     for place in usable:
         how = "each predicted by a fit without it" if place.held_out else "all fitted"
         error = f"{number(100 * place.stiffness, 2)} % in stiffness and {number(place.loss_factor, 2)} in loss factor"
-        output.print(f"{place.place}: expected error {error} (95 % of {place.points} points, {how})")
+        output.print(f"{place.place}: 95 % of {place.points} measured points are within {error} of the model ({how})")
 
 
 def print_origin(output: Output, result: Result) -> None:

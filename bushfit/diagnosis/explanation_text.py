@@ -85,8 +85,7 @@ def explanation_odds(finding: Finding) -> Odds:
         effects = [get_effect(name) for name in composition.names]
         parts += [f"{effect.phrase} ({' or '.join((effect.name, *effect.twins))})" for effect in effects]
         parts += [f"a faulty test: {part.name}" for part in composition.faulty_parts]
-        *parts, last = (*parts, *composition.nameless)
-        sentences.append(", and ".join(filter(None, (", ".join(parts), last))))
+        sentences.append(" + ".join((*parts, *composition.nameless)))
         is_rival = finding.verdict == "ambiguous" or composition is not finding.reported[0]
         fit = composition.best.state.plain if is_rival and composition.best.refitted else None
         fits.append((fit.model, misfit_covariance(fit)) if fit else None)

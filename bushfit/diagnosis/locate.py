@@ -176,10 +176,8 @@ def _describe_sweep_misfit(
     if across:
         span = range_on_side(agreeing, np.sign(largest))
     levels = f"every {fixed_axis}" if is_everywhere and len(lines) > 1 else name_levels(agreeing)
-    sentences = [
-        f"measured {direction} {quantity} is up to {number(100 * abs(largest), 2)} % of |K| {sides[0]} the model "
-        f"({span}, at {levels})"
-    ]
+    size = number(100 * abs(largest), 2)
+    sentences = [f"measured {direction} {quantity} is up to {size} % of |K| {sides[0]} the model ({span}, at {levels})"]
     means = [float(np.mean(piece)) for piece in pieces]
     if across:
         span = range_on_side(across, -np.sign(largest))

@@ -71,7 +71,7 @@ BUSHING_TESTS = (
 FIXTURE_TESTS = (
     NextTest("run the empty {place} fixture, or add a known mass, at the same frequencies", 0.5, mounted=_EMPTY),
     NextTest("put a steel dummy in the {place} fixture: this measures the rig compliance", 0.5, mounted=_DUMMY),
-    NextTest("put a reference spring of known stiffness in the {place} fixture", 0.75, mounted=_SPRING),
+    NextTest("put a reference spring in the {place} fixture: its stiffness and loss are known", 0.75, mounted=_SPRING),
 )
 
 

@@ -70,18 +70,12 @@ def with_preload(data: PreparedCampaign) -> PreparedCampaign:
         chance = _probability_of_chance(data, tests, fixed)
         listed = f"{tested.place}: {tested.count} preloads, {tested.text(place)}"
         if chance > _CHANCE / len(ranges):
-            sentence = (
-                f"{listed}: these tests show no influence of the preload on stiffness and loss: noise explains "
-                f"their differences (p = {number(chance, 2)})"
-            )
+            sentence = f"{listed}: stiffness and loss do not change beyond noise (p = {number(chance, 2)})"
             notes.append(Caveat("no_preload_influence", sentence))
             continue
         has_influence = True
         if tested.count == 2:
-            sentence = (
-                f"{listed}: the model follows a straight line over the {line}, which two preloads cannot confirm. "
-                "Add tests at a third preload between them"
-            )
+            sentence = f"{listed}: the model follows a straight line over the {line}, which two preloads cannot confirm"
             notes.append(Caveat("two_preloads", sentence))
     if not has_influence:
         return replace(data, preload_notes=tuple(notes))

@@ -233,8 +233,7 @@ def _springpot_warning(data: PreparedCampaign, static: FitResult) -> Caveat:
     return Caveat(
         "springpot_left_out",
         "m and alpha are not known yet, so the springpot was left out: the other parameters include its stiffness and "
-        f"loss at the rate of the loop. {source}, these parameters change: {changes}. bushfit run alternates the two "
-        "fits, and bushfit fit fits all parameters together",
+        f"loss at the rate of the loop. {source}, these parameters change: {changes}",
     )
 
 

@@ -88,7 +88,7 @@ def start_values(
         raise FitError(
             "the moduli of these tests are impossible for rubber",
             found=reasons[0].text,
-            hint="if units and dimensions are right, give start values in [fit] of the campaign",
+            hint="bushfit diagnose finds a wrong unit; if units and dimensions are right, give start values in [fit]",
         )
     return {**inside, **fixed}
 

@@ -346,16 +346,18 @@ class Result:
         """Warning that the tests do not rule out other models, in a list; empty if they do."""
         if not self.alternatives:
             return []
-        rivals = [one for one in self.alternatives if not {*one.model.effects} <= {*self.model.effects}]
-        effects = ([name for name in one.model.effects if name not in (*BASE, UNNAMED)] for one in rivals)
-        names = dict.fromkeys(" with ".join(added) for added in effects)
         used = "a smooth correction" if self.model.unnamed else "the most probable model"
         sentence = "the tests permit other values of the parameters"
-        if names:
-            share = 100.0 * sum(one.probability for one in rivals)
-            causes = join_names(names, "or")
-            sentence = f"the prediction uses {used}, but the tests permit {causes} (probability {share:.0f} %)"
+        if self.possible_causes:
+            sentence = f"the prediction uses {used}, but the tests permit {join_names(self.possible_causes, 'or')}"
         return [Caveat("undecided", f"{sentence}: the bands, low to high, include each alternative")]
+
+    @property
+    def possible_causes(self) -> list[str]:
+        """Effects that the model lacks and the tests do not rule out, such as "delay with inertia"."""
+        rivals = (one.model for one in self.alternatives if not {*one.model.effects} <= {*self.model.effects})
+        effects = ([name for name in model.effects if name not in (*BASE, UNNAMED)] for model in rivals)
+        return list(dict.fromkeys(" with ".join(added) for added in effects))
 
     @property
     def fitted_places(self) -> list[Place]:

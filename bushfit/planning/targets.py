@@ -72,7 +72,7 @@ class PlannedQuantity:
         Returns:
             Planned stiffness, then planned loss factor.
         """
-        exact = replace(knowledge.result, covariance=Covariance())
+        exact = replace(knowledge.result, covariance=Covariance(), usable=())
         prediction = predict(exact, place, *grid)
         points = place, prediction.frequency, prediction.amplitude
         sweep = planned_sweep(knowledge.model, *points, (1.0, 1.0), (0.0, 0.0))
@@ -159,10 +159,8 @@ class PlannedQuantity:
         name = (*knowledge.names, *knowledge.bounded)[int(np.argmax(contributions))]
         gain, phase = knowledge.noise.level
         undecided = "explanations that the tests cannot distinguish: bushfit diagnose states the next test"
-        remaining = (
-            f"the class of the rig, {number(100.0 * gain, 2)} % of gain and {number(1e3 * phase, 2)} mrad of phase "
-            f"that all repeats of a test share, in {name}"
-        )
+        shared = f"{number(100.0 * gain, 2)} % of gain and {number(1e3 * phase, 2)} mrad of phase"
+        remaining = f"the class of the rig, {shared} that all repeats of a test share, in {name}"
         if variance[worst] > 0.25 * self.variances(knowledge.covariance)[worst]:
             remaining = f"{name}, which no available test determines well enough"
         size, cause = max(

@@ -10,6 +10,7 @@ import numpy as np
 
 from bushfit.effects import Level
 from bushfit.effects.contract import Array
+from bushfit.geometry import Place
 from bushfit.model.covariance import Z95, Covariance
 from bushfit.model.model import Model
 from bushfit.model.result import Result
@@ -161,3 +162,20 @@ def uncertainty(result: Result, model: Model, points: OperatingPoints) -> Uncert
     )
     errors = np.concatenate((np.array([[1.0], [1.0j]]) * relative, left_out.root.T @ slopes / stiffness))
     return Uncertainty(covariance, np.sqrt(1.0 - np.square(weight)), errors)
+
+
+def expected_error(result: Result, place: Place, loss_factor: Array) -> Uncertainty:
+    """Expected error of a fitted result, as independent errors of the gain and the phase of the stiffness.
+
+    Args:
+        result: fitted result, which states the expected error of each tested direction.
+        place: direction or specimen.
+        loss_factor: predicted loss factor at each point, (n,).
+
+    Returns:
+        Errors whose 95 % bands of |K| and loss factor are the expected errors; zero in a direction that was not tested.
+    """
+    sizes = {error.place: (error.stiffness, error.loss_factor) for error in result.usable}
+    gain, phase = sizes.get(str(place), (0.0, 0.0))
+    relative = np.array([gain + 0.0 * loss_factor, 1j * phase / (1.0 + loss_factor**2)]) / Z95
+    return Uncertainty(Covariance(), np.ones(loss_factor.size), relative)

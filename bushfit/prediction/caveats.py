@@ -68,12 +68,9 @@ def caveats(result: Result) -> Iterator[Caveat]:
         sentence = "the smooth correction follows the measurement, not a law. Outside the measured range, it fades"
         widening = number(100.0 * Z95 * unnamed.far_deviation, 2)
         yield Caveat("correction_fades", f"{sentence} and the band widens by up to ±{widening} %")
-        yield Caveat(
-            "correction_may_be_rig",
-            "the smooth correction is assigned to the bushing, but these tests cannot distinguish it "
-            "from an effect of the rig. If it belongs to the rig, |K| of the bushing in the car differs by up to "
-            f"{number(100.0 * unnamed.largest, 2)} %",
-        )
+        size = f"|K| of the bushing in the car differs by up to {number(100.0 * unnamed.largest, 2)} %"
+        sentence = f"the smooth correction is assigned to the bushing. If it belongs to the rig, {size}"
+        yield Caveat("correction_may_be_rig", sentence)
     if result.measured is None:
         yield Caveat("not_fitted", "the model was not fitted: it has no uncertainty and no fitted range")
     if rig := rig_effects(result):
@@ -103,18 +100,17 @@ def unfitted_warnings(result: Result, direction: Place) -> Iterator[Caveat]:
         Warnings on the tests that the prediction is made from, the error of the formula, and compressibility.
     """
     fitted = result.measured.directions if result.measured else ()
-    if not fitted:
-        return
     corrected = {effect.corrects for effect in result.model.without(Level.INSTRUMENT).records}
     bushing = bushing_at(result.model.bushing, direction)
     tests = join_names(fitted)
     axes = {place.axis for place in result.fitted_places}
-    if str(direction) in fitted:
+    if str(direction) in fitted or not fitted:
         is_radial = direction.axis is Direction.RADIAL and corrected.isdisjoint(direction.labels)
         if is_radial and bushing and bushing.shape == "paper":
-            error = _radial_error(bushing)
-            sentence = f"fitted with the paper's formula, {error}. The parameters contain this error"
-            yield Caveat("formula_error", sentence).about(direction)
+            use, kind = ("fitted with", "formula_error") if fitted else ("computed by", "formula_used")
+            sentence = f"{use} the paper's formula, {_radial_error(bushing)}"
+            sentence += ". The parameters contain this error" * bool(fitted)
+            yield Caveat(kind, sentence).about(direction)
             yield from _compressibility_warning(result, bushing, direction)
         return
     of_bushing = direction.axis is Direction.AXIAL and Direction.AXIAL not in axes and not axes.isdisjoint(Direction)

@@ -177,7 +177,8 @@ def compare(
     middle = float(np.sqrt(frequencies.min() * frequencies.max()))
     parameters, joint = compare_parameters(reference, compared, middle)
     sides, points = [], list(zip(places, grids, preloads or [None] * len(places), strict=True))
-    for side, result in enumerate((reference, compared)):
+    without_expected_error = (replace(result, usable=()) for result in (reference, compared))  # both results share it
+    for side, result in enumerate(without_expected_error):
         predictions = [predict(result, pair[side], *grid, preload=preload) for pair, grid, preload in points]
         sides.append(with_model_patterns(result, predictions))
     contrasts = []

@@ -231,11 +231,8 @@ def _warnings(result: Result, response: TimeResponse, left_out: list[str]) -> It
     if np.mean(strokes < _NOISE * np.ptp(history.value)) > _MOST_NOISE:
         noise, highest = noise_and_highest_frequency(history.value, history.step)
         cutoff = f'"{number(2.0 * highest, 2)} Hz"' if 4.0 * highest * history.step < 1.0 else "above all wanted motion"
-        sentence = (
-            f"most reversals of the displacement are as small as its noise, {length.text(noise, digits=2)} "
-            "rms, and friction follows each of them. To smooth the displacement and keep the motion, "
-            f"use --lowpass {cutoff}"
-        )
+        size = length.text(noise, digits=2)
+        sentence = f"most reversals of the displacement are as small as its noise, {size} rms: use --lowpass {cutoff}"
         yield Caveat("noisy_motion", sentence).about(place)
     elif short > _MOST_SHORT:
         stroke = f"strokes shorter than the shortest tested, {length.text(shortest / (1.0 - MARGIN))}"

@@ -22,7 +22,7 @@ from bushfit.geometry import Place
 from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.model.sensitivity import stiffness_and_slopes
-from bushfit.prediction.bands import Band, agreeing_models, envelope, uncertainty
+from bushfit.prediction.bands import Band, Uncertainty, agreeing_models, envelope, expected_error, uncertainty
 from bushfit.prediction.caveats import (
     MARGIN,
     agrees_within_noise,
@@ -103,7 +103,8 @@ def predict(
     """Predict the dynamic stiffness on a grid, with 95 % bands from the covariance of the fit (delta method).
 
     The bands span all models that agree with the tests: with and without effects that may belong to the bushing or to
-    the rig, and with each of the effects that the tests cannot distinguish.
+    the rig, and with each of the effects that the tests cannot distinguish. If the model contains a smooth correction,
+    the bands include the expected error of the direction as well.
 
     Args:
         result: fitted result.
@@ -138,7 +139,10 @@ def predict(
         together = extrapolations(result, OperatingPoints(direction, *both, conditions), subject)
     else:
         models, untimed, together = agreeing_models(result, rig=rig), [], iter(())
-    predictions = [predict_with_model(source, model, points, over) for source, model in models]
+    predictions = [predict_with_model(model, points, uncertainty(one, model, points), over) for one, model in models]
+    if result.model.unnamed and not over:
+        error = expected_error(result, direction, predictions[0].loss_factor.value)
+        predictions.append(predict_with_model(models[0][1], points, error, over))
     bands: dict[str, Any] = {name: envelope([getattr(one, name) for one in predictions]) for name in _BANDS}
     in_rig = predictions[2 ** len(result.unresolved) - 1] if result.unresolved and not rig else None
     measured = None if sweeps is None else measured_stiffness(points, sweeps)
@@ -190,20 +194,21 @@ def point_warnings(
         yield Caveat("stiffness_if_rig", sentence).about(place)
 
 
-def predict_with_model(result: Result, model: Model, points: OperatingPoints, over: LargeMotion | None) -> Prediction:
-    """Predict the stiffness with one model, with the uncertainty of the fit and the error of the model.
+def predict_with_model(
+    model: Model, points: OperatingPoints, errors: Uncertainty, over: LargeMotion | None
+) -> Prediction:
+    """Predict the stiffness with one model.
 
     Args:
-        result: fitted result, which provides the covariance and the model error.
         model: the fitted model or a variant with fewer or other effects.
         points: operating points.
+        errors: uncertainty of the fit, and error of the model, at these points.
         over: slow large motion or static offset under the harmonic; None for the harmonic alone.
 
     Returns:
         Prediction without warnings.
     """
-    (direction, frequency, amplitude, conditions), errors = points, uncertainty(result, model, points)
-    names = errors.covariance.names
+    (direction, frequency, amplitude, conditions), names = points, errors.covariance.names
     if over:
         stiffness, slopes = over.stiffness_and_slopes(model, points, names)
     else:

@@ -86,8 +86,7 @@ def view_bytes(
             # a name with another number is another part or test
             similar = [name for name in siblings if re.findall(r"\d+", name) == re.findall(r"\d+", file.name)]
             hint = did_you_mean(file.name, similar, similarity=0.85) or "check the path for a typing error"
-            expected = "a campaign states paths relative to its own folder"
-            raise kind("there is no such file", file=file, expected=f"an existing file; {expected}", hint=hint)
+            raise kind("there is no such file", file=file, expected="an existing file", hint=hint)
         if not file.is_file():
             found = "a folder" if file.is_dir() else "a device"
             raise kind("this is not a file", file=file, found=found, expected="a file")

@@ -148,11 +148,9 @@ class Reduction:
             miss = np.array([step.amplitude / level - 1.0 for step in steps if step.level == level])
             if np.abs(miss).max() > MISSED_LEVEL:
                 low, high = (factor * level * (1.0 + end) for end in (miss.min(), miss.max()))
-                sentence = (
-                    f"the rig reached {low:.4g} to {high:.4g} {unit} instead of {factor * level:.4g} {unit}: "
-                    f"this changes |K| by up to {number(100 * steepest * np.abs(miss).max(), 2)} % (fits use the "
-                    "reached amplitude)"
-                )
+                change = f"|K| changes by up to {number(100 * steepest * np.abs(miss).max(), 2)} %"
+                sentence = f"the rig reached {low:.4g} to {high:.4g} {unit} instead of {factor * level:.4g} {unit}"
+                sentence += f": {change} (fits use the reached amplitude)"
                 warnings.append(Caveat("missed_level", sentence))
         if coarse := [step for step in steps if step.rows_per_cycle < _FEW_ROWS_PER_CYCLE]:
             worst = min(coarse, key=lambda step: step.rows_per_cycle)

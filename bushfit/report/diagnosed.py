@@ -19,13 +19,13 @@ _MEASURED = re.compile(
 )
 
 #: What the numbers may be used for, by the verdict of a diagnosis.
-_LARGER_ERROR = "Use stiffness and loss within the tested range, with the larger of band and expected error."
+_WITH_BANDS = "Use stiffness and loss within the tested range, with their 95 % bands."
 _USES = {
     "consistent": "The model agrees with the tests within their noise. Use the model within the tested range.",
     "named": "Use the model, which includes the named effect, within the tested range.",
-    "ambiguous": f"{_LARGER_ERROR} Do not state one cause yet.",
-    "described": f"{_LARGER_ERROR} The cause is not known.",
-    "partly": f"{_LARGER_ERROR} Part of the gap is not explained.",
+    "ambiguous": f"{_WITH_BANDS} Do not state one cause yet.",
+    "described": f"{_WITH_BANDS} The cause is not known.",
+    "partly": f"{_WITH_BANDS} Part of the gap is not explained.",
     "unexplained": "Do not release these numbers: the model misses the tests, and the cause is not known.",
 }
 

@@ -9,6 +9,7 @@ from bushfit.effects.contract import Array
 from bushfit.model.covariance import Z95
 from bushfit.model.result import Result
 from bushfit.prediction.bands import Band
+from bushfit.prediction.caveats import MARGIN
 from bushfit.prediction.static_curve import static_curve, static_rate
 from bushfit.prediction.stiffness import Prediction, predict
 from bushfit.prediction.superposed import untimed_effects
@@ -60,10 +61,13 @@ def headline_texts(result: Result, point: Prediction) -> dict[str, str]:
     preload, kelvin = point.conditions.preload, point.conditions.temperature
     conditions = [f"preload {preload.text(place)}"] if preload else []
     conditions += [] if kelvin is None else [f"{number(float(kelvin) - CELSIUS, 3)} °C"]
+    tests = result.campaign.tests if result.campaign else ()
+    tested = [end for test in tests if test.place == str(place) for end in test.amplitude]
+    is_new = bool(tested and abs(np.clip(amplitude, min(tested), max(tested)) / amplitude - 1.0) > MARGIN)
     row = {
         "place": str(place),
         "frequency": f"{number(frequency, 3)} Hz",
-        "amplitude": length.text(amplitude),
+        "amplitude": length.text(amplitude) + ", not tested in this direction" * is_new,
         "conditions": ", ".join(conditions),
         "stiffness": f"{format_aligned(dynamic[:1], 4)[0]} {unit}",
         "stiffness_band": format_interval(dynamic),
