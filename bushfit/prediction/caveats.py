@@ -104,7 +104,7 @@ def unfitted_warnings(result: Result, direction: Place) -> Iterator[Caveat]:
     bushing = bushing_at(result.model.bushing, direction)
     tests = join_names(fitted)
     axes = {place.axis for place in result.fitted_places}
-    if str(direction) in fitted or not fitted:
+    if str(direction) in fitted or not result.measured:
         is_radial = direction.axis is Direction.RADIAL and corrected.isdisjoint(direction.labels)
         if is_radial and bushing and bushing.shape == "paper":
             use, kind = ("fitted with", "formula_error") if fitted else ("computed by", "formula_used")
@@ -114,6 +114,8 @@ def unfitted_warnings(result: Result, direction: Place) -> Iterator[Caveat]:
             yield from _compressibility_warning(result, bushing, direction)
         return
     of_bushing = direction.axis is Direction.AXIAL and Direction.AXIAL not in axes and not axes.isdisjoint(Direction)
+    if not fitted:  # an older file does not state the directions
+        return
     if not (of_bushing or direction.axis in (Direction.RADIAL, Direction.TORSION)):
         if corrected.isdisjoint(direction.labels):
             sentence = (
