@@ -118,7 +118,7 @@ def combine_blocks(source: RowSource, layout: Layout, vocabulary: Vocabulary) ->
         first = [*sides[0].shared, *sides[0].columns]
         headers = (*(layout.headers[index] for index in sides[0].shared), *sides[0].headers)
         layout = replace(layout, headers=headers, units=tuple(layout.units[index] for index in first))
-    elif isinstance(source, Text) and source.is_one_block(layout):
+    elif isinstance(source, Text) and source.is_one_block(layout) and not source.repeats_header(layout):
         return source, layout
     else:
         blocks = _stacked_blocks(source, layout, vocabulary)

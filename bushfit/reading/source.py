@@ -92,12 +92,14 @@ class Text:
         return Text(self.data[self.offset(line) :], self.encoding, max(line, self.before))
 
     def is_one_block(self, layout: Layout) -> bool:
-        """Return True if the bytes of the text rule out a second block or another table below the header."""
-        start, end = self.offset(layout.header_line - 1), self.offset(layout.lines_before_data)
-        if len(self.data) > _MOST_BYTES:
-            header = self.data[start : self.offset(layout.header_line)].strip()
-            return self.data.find(header, start + len(header)) < 0
-        return not self.data[end:].translate(None, _NUMERIC + layout.delimiter.encode())
+        """Return True if the bytes below the header rule out another table, or are too many to be searched for one."""
+        end = self.offset(layout.lines_before_data)
+        return len(self.data) > _MOST_BYTES or not self.data[end:].translate(None, _NUMERIC + layout.delimiter.encode())
+
+    def repeats_header(self, layout: Layout) -> bool:
+        """Return True if the line of the header occurs again."""
+        header = self.data[self.offset(layout.header_line - 1) : self.offset(layout.header_line)].strip()
+        return self.data.find(header, self.offset(layout.header_line)) >= 0
 
     def may_contain(self, sign: str, layout: Layout) -> bool:
         """Return True if cells below the header can contain a decimal mark or thousands separator."""
