@@ -156,7 +156,7 @@ def columns_key(table: Table, role: str, unit: str) -> str:
 
 
 def choose_column(role: str, headers: Sequence[str]) -> str:
-    """Suggest campaign keys that choose one of several columns or, for forces in one direction, their sum.
+    """Suggest campaign keys that choose one of several columns or, for forces in one direction and unit, their sum.
 
     Args:
         role: role of the columns, such as "force".
@@ -165,13 +165,12 @@ def choose_column(role: str, headers: Sequence[str]) -> str:
     Returns:
         Keys such as 'columns = { force = "F1" } or columns = { force = "F2" }'.
     """
-    by_axis = dict[tuple[str | None, ...], list[str]]()
+    groups = dict[tuple[str | None, ...], list[str]]()
     for header in headers if role == "force" else ():
-        by_axis.setdefault((named_direction([header]), *_AXIS.findall(header.lower())), []).append(header)
-    alone, sums = (
-        " or ".join(f'columns = {{ {role} = "{text}" }}' for text in texts)
-        for texts in (headers[:3], [" + ".join(group) for group in by_axis.values() if len(group) > 1])
-    )
+        alike = named_direction([header]), split_unit(header)[1], *_AXIS.findall(header.lower())
+        groups.setdefault(alike, []).append(header)
+    choices = headers[:3], [" + ".join(group) for group in groups.values() if len(group) > 1]
+    alone, sums = (" or ".join(f'columns = {{ {role} = "{text}" }}' for text in texts) for texts in choices)
     return f"{alone} if this cell carries the load alone, or {sums} if these cells share the load" if sums else alone
 
 
