@@ -15,6 +15,7 @@ from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.explanations import Explanation
 from bushfit.diagnosis.faulty_parts import find_faulty_parts, is_pattern
 from bushfit.diagnosis.hypotheses import SearchState, mean_parameters
+from bushfit.diagnosis.laplace import laplace
 from bushfit.diagnosis.linear_model import LinearModel
 from bushfit.diagnosis.projected_columns import SignatureSet
 from bushfit.diagnosis.propose import proposals
@@ -25,6 +26,7 @@ from bushfit.effects import BASE, LIBRARY
 from bushfit.fitting.preparation import split_by_kind
 from bushfit.fitting.problem import FitResult
 from bushfit.model.covariance import Covariance
+from bushfit.reading.preload import Preload
 
 SHARED_RIG = RigSettings(gain_error=4e-3, phase_error=3.5e-3)
 
@@ -40,6 +42,20 @@ def best(evidence: FitResult, every: Sequence[Explanation]) -> Explanation:
         SignatureSet.split(signatures, rig)
     )
     return max(zip(known, worths, strict=True), key=lambda pair: pair[1].log_evidence)[0]
+
+
+@pytest.mark.parametrize(("stated", "names"), [(1.0, ["0.1 mm", "0.5 mm at a preload of 500 N"]), (0.96, [])])
+def test_a_level_that_another_preload_contradicts_is_no_physics(measured, fitted, stated, names):
+    first, second = (measured(seed=seed).sweeps[0] for seed in (0, 1))
+    levels = {"amplitude": stated * second.amplitude, "reached": second.amplitude}
+    second = replace(second, name="second", preload=Preload(500.0, "N"), **levels)
+    parts = find_faulty_parts(fitted(replace(measured(), loops=(), sweeps=(first, second))))
+    assert [part.name.removeprefix("the axial level ") for part in parts if part.may_be_physics] == names
+
+
+def test_a_law_that_replaces_friction_is_uniform_over_a_factor_of_20_in_each_parameter(bare):
+    densities = np.sqrt(np.array([*laplace("sliders", bare, bare)[1].values()]) / (2.0 * np.pi))
+    np.testing.assert_allclose(densities, np.full(3, 1.0 / np.log(20.0)), rtol=2e-3)
 
 
 @pytest.mark.parametrize(
