@@ -253,7 +253,7 @@ def frequency_found(waveform: str, phase: Array) -> float:
 def test_a_cycle_and_a_part_is_not_one_longer_cycle(waveform, cycles):
     starts = np.arange(0.0, 1.0, 0.05) if cycles > 1.1 else (0.0, 0.1, 0.4, 0.6)  # at an extreme a little is not seen
     found = [frequency_found(waveform, np.linspace(a, a + cycles, 2000)) for a in starts]
-    assert found == pytest.approx([1.0] * len(starts), abs=2e-3)
+    assert found == pytest.approx([1.0] * len(starts), abs=5e-4)  # straight ends err by 2e-4, curved ones by 1e-3
 
 
 def sine(cycles: float, share: float = 1.0, start: float = 0.0) -> Array:
