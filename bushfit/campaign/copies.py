@@ -14,7 +14,7 @@ import numpy as np
 
 from bushfit.caveat import Caveat, join_names
 from bushfit.effects.contract import Array
-from bushfit.reading.measurement import AnyTest, Loop, Source, Sweep, loss_factor
+from bushfit.reading.measurement import AnyTest, Loop, Sweep, loss_factor
 
 #: Minimum number of identical points that are copies; chosen: fewer may agree by chance in rounded files.
 _FEWEST_POINTS = 5
@@ -146,7 +146,10 @@ def _equal_points(first: _Rows, second: _Rows) -> Iterator[tuple[int, int]]:
 
 def without_copied_loops(loops: Sequence[Loop]) -> list[Loop]:
     """Leave out the loops of a campaign that are copies of an earlier loop; a note on that loop names its copies."""
-    return [_with_note(first, _copy_note(first, copies)) for first, *copies in group_copies(loops)]
+    return [
+        replace(first, source=first.source and first.source.with_notes(_copy_notes(first, copies)))
+        for first, *copies in group_copies(loops)
+    ]
 
 
 def without_copied_points(sweeps: Sequence[Sweep]) -> list[Sweep]:
@@ -165,7 +168,8 @@ def without_copied_points(sweeps: Sequence[Sweep]) -> list[Sweep]:
     for index, sweep in enumerate(sweeps):
         if is_copy[index].all():
             continue
-        notes = [_copy_note(sweep, [sweeps[copy] for copy, first in copies if first == index and is_copy[copy].all()])]
+        whole_copies = [sweeps[copy] for copy, first in copies if first == index and is_copy[copy].all()]
+        notes = _copy_notes(sweep, whole_copies)
         for (_, original), rows in ((pair, rows) for pair, rows in copies.items() if pair[0] == index):
             repeats = [*map(str, sorted(set(sweep.repeat[rows].tolist())))]
             of_repeats = f" of repeat{'s' * (len(repeats) > 1)} {join_names(repeats)}" if original == index else ""
@@ -176,21 +180,12 @@ def without_copied_points(sweeps: Sequence[Sweep]) -> list[Sweep]:
         names = ("frequency", "amplitude", "stiffness", "repeat", "reached", "relative_error", "temperature")
         columns = {name: getattr(sweep, name) for name in names}
         columns = {name: column[~is_copy[index]] for name, column in columns.items() if isinstance(column, np.ndarray)}
-        sweep = replace(sweep, **columns) if is_copy[index].any() else sweep
-        for note in notes:
-            sweep = _with_note(sweep, note)
-        remaining.append(sweep)
+        remaining.append(replace(sweep, source=sweep.source and sweep.source.with_notes(notes), **columns))
     return remaining
 
 
-def _copy_note(first: AnyTest, copies: Sequence[AnyTest]) -> Caveat | None:
-    """Note that names the files (or, within one file, the tests) with copies of a test; None without copies."""
+def _copy_notes(first: AnyTest, copies: Sequence[AnyTest]) -> list[Caveat]:
+    """Note that names the files (or, within one file, the tests) with copies of a test, in a list; empty without."""
     file = first.source.file if first.source else None
     names = [copy.source.file.name if copy.source and copy.source.file != file else copy.name for copy in copies]
-    return Caveat("copied_tests", f"{join_names(names)} with the same data: used once") if names else None
-
-
-def _with_note(test: AnyTest, note: Caveat | None) -> AnyTest:
-    """Add a warning, if any, to the notes on how the file of a test was read."""
-    source: Source | None = test.source
-    return replace(test, source=source.with_note(note)) if source and note else test
+    return [Caveat("copied_tests", f"{join_names(names)} with the same data: used once")] if names else []

@@ -31,7 +31,6 @@ def with_strain_checked(test: AnyTest, bushing: Bushing | None) -> AnyTest:
         test: loop or sweep in SI.
         bushing: bushing that was tested; None if it is a specimen.
     """
-    is_sized = bushing is not None or isinstance(test.direction, Specimen)
-    for note in implausible_strain(test, bushing) if is_sized else ():
-        test = replace(test, source=test.source and test.source.with_note(note))
-    return test
+    if test.source is None or not (bushing or isinstance(test.direction, Specimen)):
+        return test
+    return replace(test, source=test.source.with_notes(implausible_strain(test, bushing)))

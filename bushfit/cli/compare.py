@@ -121,9 +121,8 @@ def _print_comparison(output: Output, name: str, compared: ComparisonOutput) -> 
         title = f"parameters of {label} against {first}; p: probability of such a difference by chance (Holm)"
         columns = ("parameter", first, label, "difference", "95 % interval", "p", "unit")
         output.print_table(title, columns, map(parameter_cells, comparison.parameters))
-        if comparison.joint:
-            p, count = comparison.joint
-            output.print(f"all {count} together, with correlations: p {format_p_value(p)}")
+        if joint := comparison.joint:
+            output.print(f"all {joint.parameters} together, with correlations: p {format_p_value(joint.p)}")
     if families:
         title = "families; held out: root mean square in units of noise (1: noise alone)"
         output.print_table(title, FAMILY_HEADS, family_cells(content))

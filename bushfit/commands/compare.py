@@ -12,7 +12,6 @@ from bushfit.commands.families import COMPOUND, family_to_use, fit_campaign_fami
 from bushfit.commands.fit import fit
 from bushfit.commands.loading import HasResult, as_result
 from bushfit.commands.predict import requested_preloads
-from bushfit.commands.predicted import table_columns
 from bushfit.diagnosis.families import FittedFamily
 from bushfit.errors import BushfitError, ModelError
 from bushfit.geometry import Place, default_places, get_places
@@ -32,9 +31,8 @@ from bushfit.report.compare_document import (
     ComparisonFile,
     FamilyEntry,
     HeldOutPart,
-    JointContrast,
 )
-from bushfit.report.compared import contrast_table, differences_table, families_table, parameter_differences_table
+from bushfit.report.compared import contrast_columns, differences_table, families_table, parameter_differences_table
 from bushfit.report.page.comparison import comparison_page
 from bushfit.report.results import ResultFile
 from bushfit.validation import to_json_data
@@ -152,13 +150,16 @@ def compare(
     others_compared = list(zip(labels[1:], comparisons, strict=True))
     words = [f"{label} against A, {line}" for label, comparison in others_compared for line in comparison.sentences()]
     advice = [family_to_use(fitted, results)] if fitted else []
-    sentences = [f"{family.name}: {family.sentence}" for family in fitted[1:]]
-    advice += [f"{label}, {sentence}" for label, sentence in zip(labels[1:], sentences, strict=False)]
+    further = zip(labels[1:], fitted[1:], strict=False)
+    advice += [f"{label}, {family.name}: {family.sentence}" for label, family in further]
     warnings = [*notes, *_warnings(labels, entries, comparisons, are_families=bool(fitted))]
     content = ComparisonFile(
         SCHEMA,
         [_entry(label, entry) for label, entry in zip(labels, entries, strict=True)],
-        [_pair(label, comparison) for label, comparison in others_compared],
+        [
+            ComparedPair("A", label, one.shared, one.joint, one.parameters, contrast_columns(one))
+            for label, one in others_compared
+        ],
         [_family(*row) for row in zip(labels, fitted, results, strict=False)] or None,
         [*advice, *words],
         [warning.text for warning in warnings],
@@ -280,15 +281,6 @@ def _entry(label: str, entry: ComparedResult) -> ComparedEntry:
         result.measured,
         result.inputs,
     )
-
-
-def _pair(label: str, comparison: Comparison) -> ComparedPair:
-    """Make the entry in compare.json for the comparison of a result, by its letter (`label`), with the reference."""
-    places = {
-        str(contrast.place): table_columns(contrast_table(comparison, contrast)) for contrast in comparison.contrasts
-    }
-    joint = JointContrast(*comparison.joint) if comparison.joint else None
-    return ComparedPair("A", label, comparison.shared, joint, comparison.parameters, places)
 
 
 def _family(label: str, family: FittedFamily, result: Result) -> FamilyEntry:

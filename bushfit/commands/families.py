@@ -45,8 +45,8 @@ def fit_campaign_families(
     model = data.starting_model(data.effects, data_sets)
     fixed = [name for name, setting in campaign.fit.parameters.items() if not setting.vary]
     families, unlikely = fit_families(model, data_sets, names, fixed, data.bounds)
-    adjusted = iter(holm([family.p for family in families if family.p is not None]))
-    families = [family if family.p is None else replace(family, p=next(adjusted)) for family in families]
+    adjusted = holm([family.p for family in families])
+    families = [replace(family, p=p) for family, p in zip(families, adjusted, strict=True)]
     results = [result_of(family.fit, data.bounds, model.effects, rig=campaign.rig) for family in families]
     notes = list[Caveat]()
     if results[0].model_error is None:

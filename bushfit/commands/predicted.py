@@ -24,7 +24,7 @@ from bushfit.prediction.static_curve import StaticCurve
 from bushfit.prediction.stiffness import Prediction
 from bushfit.report import plots, tables
 from bushfit.report.results import ResultFile, place_names
-from bushfit.report.tables import prediction_table
+from bushfit.report.tables import prediction_table, table_columns
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -186,8 +186,3 @@ def by_direction(parts: Sequence[Part]) -> list[list[Part]]:
 def joined_table(make: Callable[[Part], pd.DataFrame], parts: Sequence[Part]) -> pd.DataFrame:
     """Join tables of predictions or static curves at several preloads, one below the other; `make` makes a table."""
     return pd.concat([make(part) for part in parts], ignore_index=True)
-
-
-def table_columns(table: pd.DataFrame) -> dict[str, list[Any]]:
-    """Convert a table to lists by column header, with None for empty cells."""
-    return {str(name): [None if x != x else x for x in column.tolist()] for name, column in table.items()}

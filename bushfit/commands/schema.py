@@ -13,9 +13,12 @@ from dataclasses import dataclass, is_dataclass
 from pathlib import Path
 from typing import Any, Literal
 
+from pydantic import TypeAdapter
+from pydantic.json_schema import GenerateJsonSchema
 from typing_extensions import get_original_bases
 
 from bushfit.errors import unknown_name
+from bushfit.validation import inline_fields
 
 
 @dataclass(frozen=True)
@@ -59,15 +62,14 @@ def schema(name: str) -> dict[str, Any]:
     Raises:
         BushfitError: no schema has this name.
     """
-    from pydantic import TypeAdapter
-
     if name not in DESCRIBED:
         raise unknown_name("there is no such schema", name, DESCRIBED)
     described = DESCRIBED[name]
     module, _, kind = described.type.rpartition(".")
     adapter = TypeAdapter[Any](getattr(importlib.import_module(f"bushfit.{module}"), kind))
     generated = adapter.json_schema(
-        mode="serialization" if described.way == "written" else "validation", schema_generator=_generator(described.way)
+        mode="serialization" if described.way == "written" else "validation",
+        schema_generator=TomlSchema if described.way == "toml" else FileSchema,
     )
     head = {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
@@ -77,40 +79,37 @@ def schema(name: str) -> dict[str, Any]:
     return {**head, **{key: value for key, value in _remove_unsupported(generated).items() if key != "title"}}
 
 
-def _generator(way: str) -> Any:
-    """Make a schema generator class that adds descriptions from docstrings; `way` is "written", "read" or "toml"."""
-    from pydantic.json_schema import GenerateJsonSchema
+class FileSchema(GenerateJsonSchema):
+    """Generator of the schema of a file that bushfit writes, with descriptions of the keys from docstrings."""
 
-    class Generator(GenerateJsonSchema):
-        """Methods of pydantic for parts of a schema, with the changes for the files of bushfit."""
+    def field_title_should_be_set(self, _: Any) -> bool:
+        """No key has a title, because a title derived from the key adds no information."""
+        return False
 
-        def field_title_should_be_set(self, _: Any) -> bool:
-            """No key has a title, because a title derived from the key adds no information."""
-            return False
+    def field_is_required(self, field: Any, total: bool) -> bool:
+        """All keys are required in a file that is only written."""
+        is_written = self.mode == "serialization" and field["type"] == "dataclass-field"
+        return is_written or super().field_is_required(field, total)
 
-        def field_is_required(self, field: Any, total: bool) -> bool:
-            """All keys are required in a file that bushfit writes."""
-            return (way == "written" and field["type"] == "dataclass-field") or super().field_is_required(field, total)
+    def dataclass_schema(self, schema: Any) -> dict[str, Any]:
+        """Schema of a dataclass with the descriptions of its keys."""
+        return _add_descriptions(super().dataclass_schema(schema), schema["cls"])
 
-        def nullable_schema(self, schema: Any) -> dict[str, Any]:
-            """Schema of a value that may be None; TOML has no null."""
-            return self.generate_inner(schema["schema"]) if way == "toml" else super().nullable_schema(schema)
+    def typed_dict_schema(self, schema: Any) -> dict[str, Any]:
+        """Schema of a TypedDict with the descriptions of its keys."""
+        return _add_descriptions(super().typed_dict_schema(schema), schema["cls"])
 
-        def dataclass_schema(self, schema: Any) -> dict[str, Any]:
-            """Schema of a dataclass with the descriptions of its keys."""
-            return _add_descriptions(super().dataclass_schema(schema), schema["cls"])
 
-        def typed_dict_schema(self, schema: Any) -> dict[str, Any]:
-            """Schema of a TypedDict with the descriptions of its keys."""
-            return _add_descriptions(super().typed_dict_schema(schema), schema["cls"])
+class TomlSchema(FileSchema):
+    """Generator of the schema of a TOML file, which cannot contain null."""
 
-    return Generator
+    def nullable_schema(self, schema: Any) -> dict[str, Any]:
+        """Schema of a value that may be missing."""
+        return self.generate_inner(schema["schema"])
 
 
 def _add_descriptions(table_schema: dict[str, Any], kind: type) -> dict[str, Any]:
     """Add the descriptions in the docstring of a table's type to its schema."""
-    from bushfit.validation import inline_fields
-
     properties: dict[str, Any] = table_schema["properties"]
     descriptions: dict[str, str] = {}
     for base in (*get_original_bases(kind), *reversed(kind.__mro__)):  # a TypedDict has no other bases in its order

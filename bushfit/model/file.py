@@ -49,19 +49,34 @@ def load_result(file: Path) -> Result:
     Raises:
         ModelError: the file is missing, too large or not JSON, has another schema, or an invalid key or value.
     """
-    return from_document(_read_json(file), file)
+    return from_document(read_document(file, "a model"), file)
 
 
-def read_document(file: Path) -> dict[str, Any]:
+def read_document(file: Path, kind: str = "a result") -> dict[str, Any]:
     """Read any JSON result file, such as a model or a diagnosis, as a dictionary, without checking its keys.
 
+    Args:
+        file: path of the file.
+        kind: name of the expected content for errors.
+
     Raises:
-        ModelError: the file is missing, too large or not a JSON object.
+        ModelError: the file is missing, too large or not a JSON object, or repeats a key.
     """
-    return _require_object(_read_json(file), file, "a result")
+    data = read_utf8(file, ModelError, largest=_LARGEST_BYTES, hint="bushfit fit writes a model.json")
+    try:
+        document = json.loads(data.decode("utf-8-sig"), object_pairs_hook=_refuse_duplicates)
+    except (ValueError, RecursionError) as error:
+        hint = "use the file unchanged, as bushfit fit wrote it"
+        raise ModelError(
+            "this is not valid JSON", file=file, found=str(error), expected="a model file", hint=hint
+        ) from error
+    if isinstance(document, dict):
+        return document
+    found = _KINDS.get(type(document), "null")
+    raise ModelError(f"not {kind}", file=file, found=found, expected="a JSON object { ... }")
 
 
-def from_document(document: object, file: Path | None = None) -> Result:
+def from_document(document: Mapping[str, Any], file: Path | None = None) -> Result:
     """Convert a parsed model file to a result.
 
     Args:
@@ -74,10 +89,9 @@ def from_document(document: object, file: Path | None = None) -> Result:
     Raises:
         ModelError: the schema is another one, a key is missing or invalid, or the values are not a valid model.
     """
-    content = _require_object(document, file, "a model")
     hint = "use a file written by bushfit fit-static, fit-dynamic, fit or diagnose"
-    require_schema(content, file, "a model", SCHEMA, hint=hint)
-    tables = validate_tables(content, file, ModelFile, kind=ModelError)
+    require_schema(document, file, "a model", SCHEMA, hint=hint)
+    tables = validate_tables(document, file, ModelFile, kind=ModelError)
     entries, fit, covariance = tables.parameters, tables.fit, Covariance()
     values = {name: entry.value for name, entry in entries.items()}
     with error_location(file):
@@ -237,26 +251,6 @@ def require_schema(document: Mapping[str, Any], file: Path | None, kind: str, *s
 def versions() -> dict[str, str]:
     """Versions of the numerical packages by name, for the provenance of a model file; cached."""
     return {name: importlib.metadata.version(name) for name in _PACKAGES}
-
-
-def _require_object(document: object, file: Path | None, kind: str) -> dict[str, Any]:
-    """Return parsed JSON if it is an object; otherwise raise a ModelError that names the `kind`, "a model"."""
-    if isinstance(document, dict):
-        return document
-    found = _KINDS.get(type(document), "null")
-    raise ModelError(f"not {kind}", file=file, found=found, expected="a JSON object { ... }")
-
-
-def _read_json(file: Path) -> Any:
-    """Read and parse a JSON file; raise a ModelError for invalid JSON and repeated keys."""
-    data = read_utf8(file, ModelError, largest=_LARGEST_BYTES, hint="bushfit fit writes a model.json")
-    try:
-        return json.loads(data.decode("utf-8-sig"), object_pairs_hook=_refuse_duplicates)
-    except (ValueError, RecursionError) as error:
-        hint = "use the file unchanged, as bushfit fit wrote it"
-        raise ModelError(
-            "this is not valid JSON", file=file, found=str(error), expected="a model file", hint=hint
-        ) from error
 
 
 def _refuse_duplicates(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

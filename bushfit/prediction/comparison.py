@@ -20,7 +20,13 @@ from bushfit.geometry import Place
 from bushfit.model.covariance import Z95
 from bushfit.model.result import Result
 from bushfit.prediction.bands import Band
-from bushfit.prediction.parameter_comparison import ParameterContrast, compare_parameters, holm, relative_difference
+from bushfit.prediction.parameter_comparison import (
+    JointContrast,
+    ParameterContrast,
+    compare_parameters,
+    holm,
+    relative_difference,
+)
 from bushfit.prediction.stiffness import Prediction, predict
 from bushfit.reading.preload import Preload
 from bushfit.units import format_aligned, format_range, number
@@ -62,14 +68,13 @@ class Comparison:
 
     Args:
         parameters: comparisons of the parameters that both results have.
-        joint: probability that chance causes the differences of all parameters together, and the number of differences;
-            None if no parameter is tested.
+        joint: test of all parameters together; None if no parameter is tested.
         contrasts: differences of the dynamic stiffness, one for each direction or specimen.
         shared: names of the files to which both results were fitted.
     """
 
     parameters: tuple[ParameterContrast, ...]
-    joint: tuple[float, int] | None
+    joint: JointContrast | None
     contrasts: tuple[Contrast, ...]
     shared: tuple[str, ...]
 
@@ -126,7 +131,7 @@ class Comparison:
         Notes: Hochberg's procedure (Biometrika 75 (1988) 800) for two tests, of all points and of all parameters: a
         test is significant if both are at 5 %, or if it is at 2.5 %.
         """
-        stiffness, joint = 1.0, self.joint[0] if self.joint else 1.0
+        stiffness, joint = 1.0, self.joint.p if self.joint else 1.0
         if distances := [_distance_from_zero(band).max() for band in self.bands.values() if len(band.root)]:
             stiffness = float(np.mean(self.largest_errors >= max(distances)))
         limit = CHANCE if max(stiffness, joint) < CHANCE else CHANCE / 2.0
@@ -237,12 +242,11 @@ def with_holm(comparisons: Sequence[Comparison]) -> list[Comparison]:
     Returns:
         The comparisons, with the adjusted p-value in the attribute `holm` of each tested parameter.
     """
-    adjusted = iter(holm([row.p for comparison in comparisons for row in comparison.parameters if row.p is not None]))
-    changed = []
-    for comparison in comparisons:
-        rows = (row if row.p is None else replace(row, holm=next(adjusted)) for row in comparison.parameters)
-        changed.append(replace(comparison, parameters=tuple(rows)))
-    return changed
+    adjusted = iter(holm([row.p for comparison in comparisons for row in comparison.parameters]))
+    return [
+        replace(comparison, parameters=tuple(replace(row, holm=next(adjusted)) for row in comparison.parameters))
+        for comparison in comparisons
+    ]
 
 
 def _describe_difference(band: Band, unit: str, contrast: Contrast) -> str:

@@ -17,6 +17,7 @@ from bushfit.effects.contract import Array
 from bushfit.model.covariance import Covariance
 from bushfit.model.result import Result
 from bushfit.units import number
+from bushfit.validation import Number
 
 #: Eigenvalue of a correlation matrix, relative to the largest, below which it is rounding.
 _LEAST_EIGENVALUE = 1e-10
@@ -56,9 +57,22 @@ class ParameterContrast:
     note: str = ""
 
 
+@dataclass(frozen=True)
+class JointContrast:
+    """Test of all parameters of two results together for a difference, with their correlations.
+
+    Args:
+        p: probability that chance alone causes such differences.
+        parameters: number of independent differences of parameters.
+    """
+
+    p: Number
+    parameters: int
+
+
 def compare_parameters(
     reference: Result, compared: Result, frequency: float
-) -> tuple[tuple[ParameterContrast, ...], tuple[float, int] | None]:
+) -> tuple[tuple[ParameterContrast, ...], JointContrast | None]:
     """Compare the parameters that both results have, one by one and all together.
 
     Args:
@@ -67,8 +81,7 @@ def compare_parameters(
             m (2 pi f)^alpha.
 
     Returns:
-        Comparison of each parameter; and the probability that chance causes all differences together, with their
-        number, or None if no parameter is tested.
+        Comparison of each parameter, and the test of all together, which is None if no parameter is tested.
 
     Notes: strictly positive parameters are compared by their logarithm. The unit of m depends on alpha, so m itself is
     comparable only at equal alpha; the modulus is comparable at any alpha.
@@ -115,7 +128,7 @@ def compare_parameters(
             p = 2.0 * float(stdtr(freedom[i], -abs(difference[i]) / error[i]))
             row = replace(row, difference=value, interval=(low, high), p=p)
         contrasts.append(row)
-    return tuple(contrasts), joint_p_value(difference[tested], matrix[np.ix_(tested, tested)], freedom[tested])
+    return tuple(contrasts), joint_contrast(difference[tested], matrix[np.ix_(tested, tested)], freedom[tested])
 
 
 def exponent_of(name: str, parameter: Parameter) -> str | None:
@@ -154,8 +167,8 @@ def quantities_of(result: Result, rows: Sequence[tuple[str, str | None]], omega:
     return quantities, slopes
 
 
-def joint_p_value(difference: Array, matrix: Array, freedom: Array) -> tuple[float, int] | None:
-    """Compute the probability that chance alone causes several differences together.
+def joint_contrast(difference: Array, matrix: Array, freedom: Array) -> JointContrast | None:
+    """Test whether chance alone causes several differences together.
 
     Args:
         difference: differences, (k,).
@@ -163,7 +176,7 @@ def joint_p_value(difference: Array, matrix: Array, freedom: Array) -> tuple[flo
         freedom: degrees of freedom of each difference, (k,).
 
     Returns:
-        Probability, and the number of independent differences; None without differences.
+        Probability and number of independent differences; None without differences.
 
     Notes: Hotelling's T^2 with the smallest of the degrees of freedom; chi-square if they are infinite.
     """
@@ -175,16 +188,17 @@ def joint_p_value(difference: Array, matrix: Array, freedom: Array) -> tuple[flo
     square = float(np.sum(np.square(vectors[:, significant].T @ (difference / size)) / values[significant]))
     count, fewest = int(significant.sum()), float(freedom.min())
     denominator = max(fewest - count + 1.0, 1.0)
-    return float(fdtrc(count, denominator, square * denominator / (fewest * count))), count
+    p = float(fdtrc(count, denominator, square * denominator / (fewest * count)))
+    return JointContrast(p, count)
 
 
-def holm(probabilities: Sequence[float]) -> list[float]:
-    """Adjust p-values for the number of tests by Holm's method (Scand. J. Statist. 6 (1979) 65); keeps their order."""
-    order = np.argsort(probabilities)
-    steps = np.asarray(probabilities)[order] * np.arange(len(order), 0, -1)
-    adjusted = np.empty(len(order))
-    adjusted[order] = np.minimum(np.maximum.accumulate(steps), 1.0)
-    return adjusted.tolist()
+def holm(probabilities: Sequence[float | None]) -> list[float | None]:
+    """Adjust p-values for the number of tests by Holm's method (Scand. J. Statist. 6 (1979) 65); None is no test."""
+    adjusted: dict[int, float] = {}
+    tested = sorted((p, index) for index, p in enumerate(probabilities) if p is not None)
+    for rank, (p, index) in enumerate(tested):
+        adjusted[index] = min(max(p * (len(tested) - rank), *adjusted.values(), 0.0), 1.0)
+    return [adjusted.get(index) for index in range(len(probabilities))]
 
 
 def relative_difference(logarithm: Array) -> Array:

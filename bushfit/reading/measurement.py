@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
@@ -48,9 +48,9 @@ class Source:
     conditions: Mapping[str, str | float] = field(default_factory=dict)
     notes: tuple[Caveat, ...] = ()
 
-    def with_note(self, note: Caveat) -> Source:
-        """Return the provenance with a further warning on how the file was read."""
-        return replace(self, notes=(*self.notes, note))
+    def with_notes(self, notes: Iterable[Caveat]) -> Source:
+        """Return the provenance with further warnings on how the file was read."""
+        return replace(self, notes=(*self.notes, *notes))
 
 
 @dataclass(frozen=True)

@@ -98,7 +98,7 @@ def prepare_record(record: Loop, lowpass: float | None = None) -> Loop:
     channel = DisplacementHistory(record.direction, displacement, float(time[1] - time[0]), notes=notes)
     with error_location(record.source.file if record.source else None):
         (channel,) = prepare_displacements([channel], lowpass=lowpass)
-    source = record.source and replace(record.source, notes=(*record.source.notes, *channel.notes))
+    source = record.source and record.source.with_notes(channel.notes)
     return replace(record, time=time, displacement=channel.displacement, force=force, source=source)
 
 

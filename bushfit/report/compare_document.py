@@ -7,7 +7,7 @@ from typing import Literal
 from bushfit.diagnosis.holdout import Skipped
 from bushfit.model.document import BushingTable
 from bushfit.model.result import Range
-from bushfit.prediction.parameter_comparison import ParameterContrast
+from bushfit.prediction.parameter_comparison import JointContrast, ParameterContrast
 from bushfit.reading.measurement import Source
 from bushfit.validation import Number
 
@@ -43,19 +43,6 @@ class ComparedEntry:
     nrmse: Number | None
     measured: Range | None
     inputs: tuple[Source, ...]
-
-
-@dataclass(frozen=True)
-class JointContrast:
-    """Test of all parameters of two results together for a difference, with their correlations.
-
-    Args:
-        p: probability that chance alone causes such differences.
-        parameters: number of independent differences of parameters.
-    """
-
-    p: Number
-    parameters: int
 
 
 @dataclass(frozen=True)

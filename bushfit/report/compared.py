@@ -15,10 +15,10 @@ import pandas as pd
 from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
 from bushfit.model.file import require_schema
-from bushfit.prediction.comparison import Comparison, Contrast
+from bushfit.prediction.comparison import Comparison
 from bushfit.prediction.parameter_comparison import ParameterContrast, relative_difference
 from bushfit.report.compare_document import SCHEMA, ComparisonFile, FamilyEntry
-from bushfit.report.tables import response_headers
+from bushfit.report.tables import response_headers, table_columns
 from bushfit.units import display_unit, number, split_header
 from bushfit.validation import validate_tables
 
@@ -36,31 +36,34 @@ _GAIN_HEADERS = [f"decrease of the mean square{end}" for end in ("", ", low", ",
 FAMILY_HEADS = ("family", "parameters", "NRMSE", "χ²", "probability", "held out", "first, held out", "parts")
 
 
-def contrast_table(comparison: Comparison, contrast: Contrast) -> pd.DataFrame:
-    """Table of stiffness and loss factor of two results at the same operating points, with the differences.
+def contrast_columns(comparison: Comparison) -> dict[str, dict[str, list[Any]]]:
+    """Columns of stiffness and loss factor of two results at the same operating points, with the differences.
 
     Args:
         comparison: comparison of the two results, which widens the 95 % bands so that they are valid at all points
             together.
-        contrast: stiffness and loss factor of both results at the points of one direction or specimen.
 
     Returns:
-        A row per operating point: frequency [Hz] and amplitude; stiffness (or modulus) and loss factor of both results;
-        and their differences, other minus reference, relative for the stiffness. Each has columns for the ends of its
-        95 % band ("..., low" and "..., high"), a difference also "yes" or "no" in the column "..., significant".
+        Columns by header, of each direction or specimen by its name; an entry per operating point, None if it is not
+        known: frequency [Hz] and amplitude; stiffness (or modulus) and loss factor of both results; and their
+        differences, other minus reference, relative for the stiffness. Each has columns for the ends of its 95 % band
+        ("..., low" and "..., high"), a difference also "yes" or "no" in the column "..., significant".
     """
-    (_, length), _, (_, factor) = contrast.place.display
-    columns: list[Any] = [contrast.reference.frequency, contrast.reference.amplitude * length]
-    for side in (contrast.reference, contrast.other):
-        columns += [*(factor * side.stiffness.ends), *side.loss_factor.ends]
-    for band, convert in ((contrast.stiffness, relative_difference), (contrast.loss_factor, np.asarray)):
-        columns += [*convert(band.ends), np.where(comparison.significant(band), "yes", "no")]
-    headers = contrast_headers(*response_headers(contrast.place)[:2])
-    return pd.DataFrame(dict(zip(headers, columns, strict=True)))
+    places = {}
+    for contrast in comparison.contrasts:
+        (_, length), _, (_, factor) = contrast.place.display
+        columns: list[Any] = [contrast.reference.frequency, contrast.reference.amplitude * length]
+        for side in (contrast.reference, contrast.other):
+            columns += [*(factor * side.stiffness.ends), *side.loss_factor.ends]
+        for band, convert in ((contrast.stiffness, relative_difference), (contrast.loss_factor, np.asarray)):
+            columns += [*convert(band.ends), np.where(comparison.significant(band), "yes", "no")]
+        headers = contrast_headers(*response_headers(contrast.place)[:2])
+        places[str(contrast.place)] = table_columns(pd.DataFrame(dict(zip(headers, columns, strict=True))))
+    return places
 
 
 def contrast_headers(amplitude: str, stiffness: str) -> list[str]:
-    """Headers of `contrast_table`, from headers such as "amplitude [mm]" and "stiffness [N/mm]"."""
+    """Headers of `contrast_columns`, from headers such as "amplitude [mm]" and "stiffness [N/mm]"."""
     ends = ("", ", low", ", high")
     sides = [f"{side} {name}" for side in ("reference", "other") for name in (stiffness, LOSS)]
     differences = (f"relative difference of {split_header(stiffness)[0]} [-]", f"difference of {LOSS}")
@@ -183,7 +186,7 @@ def differences_table(comparison: ComparisonFile) -> pd.DataFrame:
     """Table of the differences of stiffness and loss factor, differences.csv: a row per pair and operating point.
 
     Returns:
-        Letter of the other result, direction or specimen, and the columns of `contrast_table`: frequency, amplitude,
+        Letter of the other result, direction or specimen, and the columns of `contrast_columns`: frequency, amplitude,
         values of both results and their differences, with 95 % bands.
     """
     by_result = zip(*place_differences(comparison).values(), strict=True)

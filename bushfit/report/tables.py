@@ -341,6 +341,11 @@ def shift_factors_table(shifted_sweeps: Sequence[ShiftedSweep]) -> pd.DataFrame:
     return pd.DataFrame(columns)
 
 
+def table_columns(table: pd.DataFrame) -> dict[str, list[Any]]:
+    """Convert a table to lists by column header, with None for empty cells."""
+    return {str(name): [None if x != x else x for x in column.tolist()] for name, column in table.items()}
+
+
 def shorten(name: str, letters: int) -> str:
     """Shorten a name to at most `letters` characters by an ellipsis in its middle; control characters are escaped."""
     name = printable(name)

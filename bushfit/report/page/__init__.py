@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import base64
 import hashlib
-from functools import cache, partial
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from bushfit.errors import ModelError, printable
 from bushfit.model.file import read_document, require_schema
 from bushfit.report.results import ResultFile
+from bushfit.templates import template_environment
 from bushfit.units import format_range, number
 from bushfit.validation import validate_tables
-
-if TYPE_CHECKING:
-    import jinja2
 
 #: Folder of the templates, and of the style sheet and the script that every page contains.
 TEMPLATES = Path(__file__).parent / "templates"
@@ -33,35 +31,17 @@ def render_page(template: str, context: dict[str, Any]) -> str:
     """
     from markupsafe import Markup
 
+    from bushfit.report.page.formulas import formula
+
     style, script = (Markup((TEMPLATES / name).read_text(encoding="utf-8")) for name in ("style.css", "script.js"))
     digests = [base64.b64encode(hashlib.sha256(text.encode()).digest()).decode() for text in (style, script)]
     sources = "style-src 'sha256-{}'; script-src 'sha256-{}'; img-src data:".format(*digests)
     allowed = f"default-src 'none'; {sources}; base-uri 'none'; form-action 'none'"
     constants = {"style": style, "script": script, "allowed": allowed}
-    return printable(templates().get_template(template).render({**constants, **context}), lines=True) + "\n"
-
-
-@cache
-def templates() -> jinja2.Environment:
-    """Create the jinja2 environment from which the HTML pages are rendered, with automatic escaping of texts.
-
-    Returns:
-        Environment with the filters `number` (significant digits) and `formula`, and the function `format_range`.
-    """
-    import jinja2
-
-    from bushfit.report.page.formulas import formula
-
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(TEMPLATES),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
+    environment = template_environment(TEMPLATES, is_markup=True)
     environment.filters |= {"number": number, "formula": formula}
     environment.globals["format_range"] = format_range
-    return environment
+    return printable(environment.get_template(template).render({**constants, **context}), lines=True)
 
 
 def folder_pages(folder: Path, base: str = "", date: str | None = None) -> list[ResultFile]:
