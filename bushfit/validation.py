@@ -246,6 +246,13 @@ def table(convert: Callable[[dict[str, Any]], Any], written: Mapping[str, Any] |
     return converter(lambda raw, _: convert(raw) if isinstance(raw, dict) else raw, written)
 
 
+def tables(convert: Callable[[str, dict[str, Any]], Any]) -> BeforeValidator:
+    """Validator that converts each table by its name; pydantic checks entries that are no tables."""
+    return table(
+        lambda raw: {name: convert(name, entry) if isinstance(entry, dict) else entry for name, entry in raw.items()}
+    )
+
+
 def _frequencies(raw: dict[str, Any]) -> list[str]:
     """Frequencies, as texts in Hz, of a table with start, stop and step; both ends are included."""
     expected = '{ start = "5 Hz", stop = "155 Hz", step = "10 Hz" }, or a list such as ["5 Hz", "15 Hz"]'

@@ -32,7 +32,7 @@ from bushfit.batch.quantities import (
     STIFFNESS,
     PartQuantity,
 )
-from bushfit.campaign.quantities import convert_limits
+from bushfit.campaign.quantities import convert_values
 from bushfit.campaign.toml import parse_toml
 from bushfit.caveat import Caveat
 from bushfit.diagnosis import document
@@ -43,7 +43,7 @@ from bushfit.geometry.point import PointText
 from bushfit.reduction.arrays import median_and_scatter
 from bushfit.report.batch_document import LimitResult
 from bushfit.units import number, parse_quantity
-from bushfit.validation import ParameterValue, Share, converter, table, text, validate_tables
+from bushfit.validation import ParameterValue, Share, converter, tables, text, validate_tables
 
 #: Results in the order from good to bad.
 RESULTS: Sequence[LimitResult] = ("pass", "conditional pass", "not judged", "conditional fail", "fail")
@@ -147,8 +147,8 @@ class Limits:
 
     __pydantic_config__ = ConfigDict(extra="forbid")
 
-    parameters: Annotated[Mapping[str, Bounds], table(partial(convert_limits, keys=("min", "max", "nominal")))] = field(
-        default_factory=dict
+    parameters: Annotated[Mapping[str, Bounds], tables(partial(convert_values, keys=("min", "max", "nominal")))] = (
+        field(default_factory=dict)
     )
     stiffness: tuple[StiffnessBounds, ...] = ()
     loss_factor: tuple[LossFactorBounds, ...] = ()

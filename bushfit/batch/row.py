@@ -6,11 +6,11 @@ import json
 import time
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
-from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from bushfit.batch import store
 from bushfit.batch.document import ROW_SCHEMA, Estimate, RowFile
@@ -69,7 +69,7 @@ class RowTask:
         if self.version != __version__:
             problem, hint = "a worker runs another bushfit version", "install the same version on all workers"
             raise BatchError(problem, found=__version__, expected=self.version, hint=hint)
-        limit_threads()
+        threadpool_limits(1)  # as the rows of a batch use the cores
         settings = asdict(row.settings), asdict(self.formats), [str(point) for point in self.points]
         key = store.digest(json.dumps([__version__, ROW_SCHEMA, *settings], sort_keys=True).encode())
         if self.resume and (earlier := store.load_row(self.output, row, key)):
@@ -89,14 +89,6 @@ class RowTask:
         except OSError as error:
             record = RowFile(status="failed", error=f"the results cannot be written: {error}")
         return record, False
-
-
-@cache
-def limit_threads() -> Any:
-    """Return a context that runs linear algebra on one thread, as the rows of a batch use the cores."""
-    from threadpoolctl import threadpool_limits
-
-    return threadpool_limits(1)
 
 
 def evaluate(row: Row, points: Sequence[Point], formats: Formats) -> tuple[RowFile, dict[str, bytes]]:

@@ -2,7 +2,7 @@
 
 import base64
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -59,58 +59,46 @@ def parameter_value(place: str, name: str, raw: Any) -> float:
         return parse_quantity(_S_TO_ALPHA.sub("", raw) if unit != file_unit and isinstance(raw, str) else raw, unit)
 
 
-def convert_effects(raw: dict[str, Any]) -> dict[str, Any]:
-    """Convert values such as {"inertia": {"mass": "0.1 kg"}} to SI, before pydantic checks them; keep other entries."""
-    return {
-        effect: {key: parameter_value(f"{effect}.{key}", f"{effect}.{key}", value) for key, value in table.items()}
-        if isinstance(table, dict)
-        else table
-        for effect, table in raw.items()
-    }
+def convert_effect(effect: str, entry: Mapping[str, Any]) -> dict[str, float]:
+    """Convert the parameter values of an effect, such as {"mass": "0.1 kg"}, to SI, before pydantic checks them."""
+    names = {key: f"{effect}.{key}" for key in entry}
+    return {key: parameter_value(name, name, entry[key]) for key, name in names.items()}
 
 
-def convert_limits(raw: dict[str, Any], keys: Sequence[str]) -> dict[str, Any]:
-    """Convert limits of parameters to SI, before pydantic checks them; entries that are no tables are unchanged.
+def convert_values(name: str, entry: Mapping[str, Any], keys: Sequence[str]) -> dict[str, Any]:
+    """Convert the values of a parameter in a table, such as {"min": "1 MPa"}, to SI, before pydantic checks them.
 
     Args:
-        raw: tables by parameter name, such as {"mu": {"min": "1 MPa"}}.
-        keys: keys of a table that are converted, such as "min".
+        name: name of the parameter.
+        entry: table of the parameter; its other keys are unchanged.
+        keys: keys of the values that are converted, such as "min".
     """
-    return {
-        name: table | {key: parameter_value(f"{name}.{key}", name, table[key]) for key in keys if key in table}
-        if isinstance(table, dict)
-        else table
-        for name, table in raw.items()
-    }
+    return {**entry, **{key: parameter_value(f"{name}.{key}", name, entry[key]) for key in keys if key in entry}}
 
 
-def parameter_settings(raw: dict[str, Any]) -> dict[str, Any]:
-    """Convert the tables of [fit.parameters] to SI.
+def convert_setting(name: str, entry: Mapping[str, Any]) -> dict[str, Any]:
+    """Convert a table of [fit.parameters] to SI.
 
     A min or a max outside the bounds of the parameter is moved to the bound, such as a min of "0 MPa".
 
     Args:
-        raw: tables of value, min, max and vary by parameter name.
+        name: name of the parameter.
+        entry: table of value, min, max and vary.
 
     Returns:
-        The same tables with value, min and max in SI.
+        The table with value, min and max in SI.
 
     Raises:
         CampaignError: min, value and max that are not increasing, or outside the bounds of the parameter.
     """
     keys = ("min", "value", "max")
-    settings = convert_limits(raw, keys)
-    for name, table in settings.items():
-        if isinstance(table, dict):
-            ordered = [table[key] for key in keys if key in table]
-            parameter = get_parameter(name)
-            low, high = parameter.bounds
-            ends = np.clip([table.get("min", low), table.get("max", high)], low, high)
-            if ordered != sorted(ordered) or ends[0] == ends[1]:
-                expected = f"min below max within {low:g} to {high:g} {parameter.unit}, and value between them"
-                raise CampaignError("no value meets these limits", place=name, found=str(raw[name]), expected=expected)
-            table |= {key: float(end) for key, end in zip(("min", "max"), ends, strict=True) if key in table}
-    return settings
+    setting, parameter = convert_values(name, entry, keys), get_parameter(name)
+    ordered, (low, high) = [setting[key] for key in keys if key in setting], parameter.bounds
+    ends = np.clip([setting.get("min", low), setting.get("max", high)], low, high)
+    if ordered != sorted(ordered) or ends[0] == ends[1]:
+        expected = f"min below max within {low:g} to {high:g} {parameter.unit}, and value between them"
+        raise CampaignError("no value meets these limits", place=name, found=str(entry), expected=expected)
+    return setting | {key: float(end) for key, end in zip(("min", "max"), ends, strict=True) if key in setting}
 
 
 def _plain_number(quantity: str, unit: str, example: str, largest: float, smallest: float = 0.0) -> BeforeValidator:

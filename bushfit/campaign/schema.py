@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import ConfigDict, Field
 
 from bushfit.campaign.bodies import BushingSettings, SeveralBushings, SpecimenSettings, specimens_of
-from bushfit.campaign.quantities import Compound, EffectsSettings, ReportSettings, parameter_settings
+from bushfit.campaign.quantities import Compound, EffectsSettings, ReportSettings, convert_setting
 from bushfit.campaign.simulated import SimulateSettings
 from bushfit.effects import is_parameter, library_parameters
 from bushfit.reading.stated import LoopFile, SweepFile, ValidationFile, with_places
@@ -29,6 +29,7 @@ from bushfit.validation import (
     known_keys,
     si,
     table,
+    tables,
     unknown_key,
 )
 
@@ -142,7 +143,7 @@ class FitSettings:
     loss: Loss = "linear"
     effects: tuple[Text, ...] = ()
     prior: Text | None = None
-    parameters: Annotated[Mapping[str, ParameterSetting], table(parameter_settings)] = field(
+    parameters: Annotated[Mapping[str, ParameterSetting], tables(convert_setting)] = field(
         default_factory=dict, metadata=inline_keys(library_parameters)
     )
 

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field, InstanceOf, WithJsonSchema
 
-from bushfit.campaign.quantities import convert_effects, parameter_value
+from bushfit.campaign.quantities import convert_effect, parameter_value
 from bushfit.effects.contract import Array
 from bushfit.errors import CampaignError
 from bushfit.geometry import TRANSLATION, Place
@@ -29,6 +29,7 @@ from bushfit.validation import (
     inline_keys,
     si,
     table,
+    tables,
 )
 
 
@@ -208,7 +209,7 @@ class SimulateSettings:
         Mapping[str, ParameterValue],
         table(lambda raw: {name: parameter_value(name, name, value) for name, value in raw.items()}),
     ] = field(default_factory=dict)
-    effects: Annotated[Mapping[str, Mapping[str, ParameterValue]], table(convert_effects)] = field(default_factory=dict)
+    effects: Annotated[Mapping[str, Mapping[str, ParameterValue]], tables(convert_effect)] = field(default_factory=dict)
     seed: Annotated[int, Field(strict=True, ge=0)] = 0
     repeats: Repeats = 1
     noise: Share = 0.0

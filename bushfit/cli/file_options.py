@@ -13,7 +13,7 @@ from typing import Any, Literal
 
 import click
 
-from bushfit.cli.options import FILE, Parameter, add_parameters, option, option_group, option_name
+from bushfit.cli.options import FILE, Parameter, combined, option, option_group, option_name
 from bushfit.errors import BushfitError, MeasurementError
 
 #: Metadata options by group and campaign key, each with its placeholder, help and permitted values; and questions.
@@ -54,11 +54,10 @@ def metadata_options(kind: Literal["tests", "histories", "displacements"] = "tes
     file_format = option_group("File format, if it is not detected", *_options("format"), record=record)
     heading = "Information that is missing in the file"
     if kind == "displacements":
-        return lambda function: add_parameters(function, option_group(heading, *columns, record=record), file_format)
+        return combined(option_group(heading, *columns, record=record), file_format)
     direction, sign = _options("files")
     information = (direction, *columns, sign, *(_options("tests") if kind == "tests" else ()))
-    return lambda function: add_parameters(
-        function,
+    return combined(
         click.argument("files", metavar="FILE...", nargs=-1, required=True, type=FILE, callback=require_tests),
         option_group(f"{heading}s", *information, record=record),
         file_format,

@@ -1,6 +1,7 @@
 """Option types, options shared by several commands, and commands with examples."""
 
 from collections.abc import Callable
+from functools import reduce
 from pathlib import Path
 from typing import Any
 
@@ -132,11 +133,9 @@ def command_called(name: str, *examples: str) -> Callable[[Function], click.Comm
     )
 
 
-def add_parameters(function: Function, *parameters: Parameter) -> Function:
-    """Add options and arguments to the function of a command, before its existing parameters; return the function."""
-    for parameter in reversed(parameters):
-        function = parameter(function)
-    return function
+def combined(*parameters: Parameter) -> Parameter:
+    """Combine decorators of options and arguments into one that adds them before the existing ones, in this order."""
+    return lambda function: reduce(lambda decorated, add: add(decorated), reversed(parameters), function)
 
 
 def option_group(heading: str, *parameters: Parameter, record: Record | None = None) -> Parameter:
@@ -154,7 +153,7 @@ def option_group(heading: str, *parameters: Parameter, record: Record | None = N
 
     def decorate(function: Function) -> Function:
         before = len(getattr(function, "__click_params__", ()))
-        add_parameters(function, *parameters)
+        combined(*parameters)(function)
         for parameter in vars(function)["__click_params__"][before:]:
             parameter.heading, parameter.record = heading, record
         return function

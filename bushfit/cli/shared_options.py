@@ -12,9 +12,8 @@ import click
 
 from bushfit.cli.options import (
     FILE,
-    Function,
     Parameter,
-    add_parameters,
+    combined,
     direction_option,
     file_option,
     option,
@@ -35,21 +34,6 @@ TEMPERATURE = option(
 )
 
 
-def campaign_options(function: Function) -> Function:
-    """Add the argument CAMPAIGN (`campaigns`) and the options of all commands that fit a campaign."""
-    loss = "linear: least squares; soft_l1: little or no weight for points far from the model [from the campaign]."
-    limit = "Exit with status 1 if the misfit (NRMSE) exceeds this share of the stiffness, such as 2 %."
-    return add_parameters(
-        function,
-        click.argument("campaigns", metavar="CAMPAIGN", nargs=-1, required=True, type=FILE),
-        option_group(
-            "Fit",
-            option("--loss LOSS", loss, type=click.Choice(["linear", "soft_l1"])),
-            option("--max-nrmse SHARE", limit, type=number_up_to(1.0, "share up to 1, such as 0.02 or 2 %")),
-        ),
-    )
-
-
 def number_up_to(maximum: float, name: str) -> Callable[[str], float]:
     """Make the parser of an option for a positive number up to a maximum, also in percent; `name` is for errors."""
 
@@ -60,6 +44,19 @@ def number_up_to(maximum: float, name: str) -> Callable[[str], float]:
         raise click.BadParameter(f"{text} is not a {name}")
 
     return parse
+
+
+_LOSS = "linear: least squares; soft_l1: little or no weight for points far from the model [from the campaign]."
+_LIMIT = "Exit with status 1 if the misfit (NRMSE) exceeds this share of the stiffness, such as 2 %."
+#: Argument CAMPAIGN (`campaigns`) and options of all commands that fit a campaign.
+campaign_options = combined(
+    click.argument("campaigns", metavar="CAMPAIGN", nargs=-1, required=True, type=FILE),
+    option_group(
+        "Fit",
+        option("--loss LOSS", _LOSS, type=click.Choice(["linear", "soft_l1"])),
+        option("--max-nrmse SHARE", _LIMIT, type=number_up_to(1.0, "share up to 1, such as 0.02 or 2 %")),
+    ),
+)
 
 
 def open_campaign(campaigns: Sequence[Path]) -> Campaign:
@@ -99,20 +96,18 @@ def grid_options(default: str, *, static: bool = False) -> Parameter:
     Returns:
         Decorator that adds --frequencies, --amplitudes, --torsion-amplitudes and --strain-amplitudes to a command.
     """
-    options = [
-        option(f"--{name} GRID", words, type=grid(unit, static=static and unit == "Hz"))
-        for name, unit, words in (
-            ("frequencies", "Hz", f'Frequencies: start:stop:step, "5:155:10 Hz", or a list, "20, 50 Hz" [{default}].'),
-            ("amplitudes", "m", f'Displacement amplitudes, zero-to-peak, such as "0.1, 0.5 mm" [{default}].'),
-            (
-                "torsion-amplitudes",
-                "rad",
-                'Rotation amplitudes for --direction torsion, zero-to-peak ["0.5, 1, 2 deg"].',
-            ),
-            ("strain-amplitudes", "1", 'Strain amplitudes for specimens tested by modulus (DMA) ["1, 2, 5 %"].'),
+    words = {
+        ("frequencies", "Hz"): f'Frequencies: start:stop:step, "5:155:10 Hz", or a list, "20, 50 Hz" [{default}].',
+        ("amplitudes", "m"): f'Displacement amplitudes, zero-to-peak, such as "0.1, 0.5 mm" [{default}].',
+        ("torsion-amplitudes", "rad"): 'Rotation amplitudes for --direction torsion, zero-to-peak ["0.5, 1, 2 deg"].',
+        ("strain-amplitudes", "1"): 'Strain amplitudes for specimens tested by modulus (DMA) ["1, 2, 5 %"].',
+    }
+    return combined(
+        *(
+            option(f"--{name} GRID", text, type=grid(unit, static=static and unit == "Hz"))
+            for (name, unit), text in words.items()
         )
-    ]
-    return lambda function: add_parameters(function, *options)
+    )
 
 
 def prediction_options(campaign: str, *, static: bool = False) -> Parameter:

@@ -160,7 +160,8 @@ def predicted_parts(before: FitResult, after: FitResult, bounds: Bounds) -> tupl
     Returns:
         Predictions by the name of the part, and the parts that at least one model cannot predict.
     """
-    models = [(fit, _leave_out(fit)) for fit in dict.fromkeys((before, after))]
+    fits = dict.fromkeys((before, after))
+    models = [(fit, LeaveOut.from_fit(fit.jacobian[fit.inner_indices], fit.residual)) for fit in fits]
     predictions, skipped = dict[str, Predicted](), list[Skipped]()
     for part in track("parts held out", hold_out_parts(after.data_sets)):
         attempts = [_predict(*model, part, bounds) for model in models]
@@ -194,11 +195,6 @@ class Predicted(NamedTuple):
     noise_gradients: Array
 
 
-def _leave_out(fit: FitResult) -> LeaveOut:
-    """Linearise a fit so that residuals without some rows can be predicted; parameters at a bound are fixed."""
-    return LeaveOut.from_fit(fit.jacobian[fit.inner_indices], fit.residual)
-
-
 def _predict(fit: FitResult, leave_out: LeaveOut, part: HoldOutPart, bounds: Bounds) -> tuple[Array, Array] | Skipped:
     """Predict a part of the tests from the other parts by one model, with a refit if a Gauss-Newton step is too long.
 
@@ -225,7 +221,8 @@ def _predict(fit: FitResult, leave_out: LeaveOut, part: HoldOutPart, bounds: Bou
             rest = fit_model(fit.model, part.rest(data_sets), fit.fixed, bounds)
         except (FitError, ModelError):
             return failed
-        leave_out = _leave_out(rest.reevaluate(rest.model, data_sets))
+        rest = rest.reevaluate(rest.model, data_sets)
+        leave_out = LeaveOut.from_fit(rest.jacobian[rest.inner_indices], rest.residual)
         if rest.stopped or leave_out.undetermined(rows).any():
             return failed
     residuals = leave_out.predicted_residual(rows, stepped=is_step)

@@ -179,7 +179,7 @@ def _chi_squares(test: NextTest, models: Sequence[Model], place: Place, frequenc
         steel dummy by its compliance, because either is nearly zero and its logarithm has no meaning.
     """
     if test.mounted is None:
-        responses = [_finite_log(model.stiffness(place, frequency, amplitude)) for model in models]
+        responses = np.array([model.stiffness(place, frequency, amplitude) for model in models])
     else:
         reference = np.abs(models[0].stiffness(place, frequency, amplitude)).mean()
         measured = []
@@ -188,17 +188,12 @@ def _chi_squares(test: NextTest, models: Sequence[Model], place: Place, frequenc
             modulus = min(test.mounted * reference / model.stiffness_per_modulus(place), _LARGEST_MODULUS)
             fixture = Model.with_defaults(model.bushing, ("elastic", *rig), {**model.values, "mu": modulus})
             measured.append(fixture.stiffness(place, frequency, amplitude) / reference)
-        if test.mounted == _SPRING:
-            responses = [_finite_log(ratio) for ratio in measured]
-        else:
-            responses = [1.0 / ratio if test.mounted == _DUMMY else ratio for ratio in measured]
-    stacked = np.array(responses)
-    return np.sum(np.square(np.abs(stacked[:, None] - stacked)), axis=-1) / _NOISE**2
-
-
-def _finite_log(stiffness: Array) -> Array:
-    """Natural log of complex stiffnesses, (n,), finite even where a model has no stiffness."""
-    return np.log(stiffness + np.finfo(float).tiny)
+        responses = np.array(measured)
+    if test.mounted in (None, _SPRING):
+        responses = np.log(responses + np.finfo(float).tiny)  # finite even where a model has no stiffness
+    elif test.mounted == _DUMMY:
+        responses = 1.0 / responses
+    return np.sum(np.square(np.abs(responses[:, None] - responses)), axis=-1) / _NOISE**2
 
 
 def _operating_points(test: NextTest, data_sets: Sequence[MeasuredTest]) -> tuple[Array, Array, Place]:

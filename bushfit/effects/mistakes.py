@@ -17,7 +17,7 @@ from bushfit.effects import get_effect
 from bushfit.effects.contract import Effect, Level
 from bushfit.errors import ModelError
 from bushfit.geometry import ROTATION, TRANSLATION, Bushing, Direction, Motion, Place
-from bushfit.reading.measurement import Complex, Loop, Sweep
+from bushfit.reading.measurement import Complex, Loop, Sweep, loss_factor
 
 _Test = TypeVar("_Test", bound=Loop | Sweep)
 
@@ -175,11 +175,6 @@ def _is_of_rubber(modulus: float, strain: float) -> bool:
     return _MODULI[0] < modulus < _MODULI[1] and _STRAINS[0] < strain < _STRAINS[1]
 
 
-def _loss(stiffness: Complex) -> float:
-    """Median loss factor (imaginary over real part) of complex stiffnesses, (n,)."""
-    return float(np.median(stiffness.imag / stiffness.real))
-
-
 def _scale_loss(factor: float, stiffness: Complex) -> Complex:
     """Complex stiffnesses, (n,), with unchanged magnitudes |K| and with loss factors multiplied by `factor`."""
     loss = 1.0 + 1j * factor * stiffness.imag / stiffness.real
@@ -201,9 +196,9 @@ _LAWS: dict[str, Any] = {
     # |K| was given as K', with the correct K''
     "storage": lambda k: np.sqrt(np.maximum(k.real**2 - k.imag**2, 0.0)) + 1j * k.imag,
     # chosen: the least damping of filled rubbers have twice that
-    "little_loss": lambda k: 0.0 < _loss(k) < 0.02,
+    "little_loss": lambda k: 0.0 < np.median(loss_factor(k)) < 0.02,
     # chosen: the largest loss of a rubber in a bushing reaches that at no temperature of use
-    "much_loss": lambda k: _loss(k) > 1.0,
+    "much_loss": lambda k: np.median(loss_factor(k)) > 1.0,
     "translation": TRANSLATION,
     "rotation": ROTATION,
 }

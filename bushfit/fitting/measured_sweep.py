@@ -292,11 +292,9 @@ class MeasuredSweep(MeasuredBase):
         """
         with np.errstate(invalid="ignore"):
             rows = np.concatenate((difference.real, difference.imag), axis=-1) * self.per_noise
-            return self.model_errors.whiten(rows) if self.model_error else self._whiten(rows)
-
-    def _whiten(self, rows: Array) -> Array:
-        """Whiten deviations in units of random noise, (..., 2 n), by the errors that runs and levels share."""
-        return self.level_errors.whiten(self.run_errors.whiten(rows))
+            if self.model_error:
+                return self.model_errors.whiten(rows)
+            return self.level_errors.whiten(self.run_errors.whiten(rows))
 
     def noise_sensitivity(self, influence: Array) -> dict[Hashable, Array]:
         """Change of the weights of the residuals in k estimates if a noise variance changes by its standard error.
@@ -315,7 +313,7 @@ class MeasuredSweep(MeasuredBase):
         runs, levels, noise, reactions = self.run_errors, self.level_errors, self.noise, dict[str, Array]()
         rows = levels.whiten(influence)
         if noise.random_freedom:
-            reactions["scatter"] = self._whiten(runs.whiten(rows)) * np.sqrt(2.0 / noise.random_freedom)
+            reactions["scatter"] = levels.whiten(runs.whiten(runs.whiten(rows))) * np.sqrt(2.0 / noise.random_freedom)
         if noise.freedom:
             variance = np.square(runs.deviations)
             _, first, counts = np.unique(self._run, return_index=True, return_counts=True)
