@@ -25,13 +25,7 @@ from pydantic import ConfigDict, Field
 
 from bushfit.batch.document import Estimate, RowFile
 from bushfit.batch.manifest import Row
-from bushfit.batch.quantities import (
-    FIT_NAMES,
-    FIT_QUALITY,
-    LOSS_FACTOR,
-    STIFFNESS,
-    PartQuantity,
-)
+from bushfit.batch.quantities import FIT_NAMES, FIT_QUALITY, LOSS_FACTOR, STIFFNESS, PartQuantity
 from bushfit.campaign.quantities import convert_values
 from bushfit.campaign.toml import parse_toml
 from bushfit.caveat import Caveat

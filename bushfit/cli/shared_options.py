@@ -10,15 +10,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from bushfit.cli.options import (
-    FILE,
-    Parameter,
-    combined,
-    direction_option,
-    file_option,
-    option,
-    option_group,
-)
+from bushfit.cli.options import FILE, Parameter, combined, direction_option, file_option, option, option_group
 from bushfit.errors import UnitError
 from bushfit.units import is_compatible, parse_quantity, parse_temperature, regular_steps
 
@@ -208,11 +200,9 @@ def grid(unit: str, *, static: bool = False) -> Callable[[str], Grid]:
         is_zero = static and numbers == [0.0]
         values = Grid(regular_steps(*numbers) if is_range else () if is_zero else numbers)
         values.text = text
-        if is_zero:
-            return values
-        if not values:
+        if not (values or is_zero):
             raise UnitError("start:stop:step contains no value", found=text, expected=expected, hint=hint)
-        if min(values) <= 0.0:
+        if min(values, default=1.0) <= 0.0:
             raise UnitError("frequencies and amplitudes must be above zero", found=text, expected=expected, hint=hint)
         return values
 

@@ -1,9 +1,9 @@
 """export: convert a fitted model to the files of other programs."""
 
-import importlib
 from collections.abc import Sequence
 from datetime import UTC, datetime
 from functools import partial
+from pkgutil import resolve_name
 from typing import Any
 
 import numpy as np
@@ -87,8 +87,7 @@ def export(
     request = ExportRequest(result, source, tuple(predicted.predictions), day=today, **settings)
     exported, formats = list[Exported](), dict[str, FormatEntry]()
     for name in track("formats written", names):
-        module, _, function = FORMATS[name].partition(":")
-        written: Exported = getattr(importlib.import_module(f"bushfit.{module}"), function)(request)
+        written: Exported = resolve_name(f"bushfit.{FORMATS[name]}")(request)
         exported.append(written)
         limits = to_entries(written.omissions)
         left_out, kinds = limits["warnings"], limits["warning_kinds"]

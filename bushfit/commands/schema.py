@@ -4,13 +4,13 @@ Each schema is generated on demand from the type that reads or writes the file. 
 docstring of this type, so a schema cannot be out of date.
 """
 
-import importlib
 import inspect
 import re
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, is_dataclass
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import Any, Literal
 
 from pydantic import TypeAdapter
@@ -65,8 +65,7 @@ def schema(name: str) -> dict[str, Any]:
     if name not in DESCRIBED:
         raise unknown_name("there is no such schema", name, DESCRIBED)
     described = DESCRIBED[name]
-    module, _, kind = described.type.rpartition(".")
-    adapter = TypeAdapter[Any](getattr(importlib.import_module(f"bushfit.{module}"), kind))
+    adapter = TypeAdapter[Any](resolve_name(f"bushfit.{described.type}"))
     generated = adapter.json_schema(
         mode="serialization" if described.way == "written" else "validation",
         schema_generator=TomlSchema if described.way == "toml" else FileSchema,

@@ -73,7 +73,7 @@ def test_equal_bushings_differ_no_oftener_than_said(fits):
     found = [against(one, two) for one, two, _ in fits]
     alarms = {
         "a parameter, Holm": sum(any(row.holm is not None and row.holm < 0.05 for row in f.parameters) for f in found),
-        "all together": sum(f.joint is not None and f.joint[0] < 0.05 for f in found),
+        "all together": sum(f.joint is not None and f.joint.p < 0.05 for f in found),
         "words": sum(any("higher" in line or "lower" in line for line in f.sentences()) for f in found),
         "headline": sum(bool(f.differing) for f in found),
     }
