@@ -1,6 +1,6 @@
 """Two results compared: known differences are found and covered, equal bushings are equal, m waits for alpha."""
 
-from dataclasses import replace
+from dataclasses import astuple, replace
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ from bushfit.model.model import FIVE, Model
 from bushfit.model.result import Result
 from bushfit.prediction.bands import Band
 from bushfit.prediction.comparison import Comparison, compare, with_holm
-from bushfit.prediction.parameter_comparison import ParameterContrast
+from bushfit.prediction.parameter_comparison import JointContrast, ParameterContrast
 from bushfit.simulation.measured import measure
 from bushfit.simulation.undisturbed import Undisturbed, undisturbed
 
@@ -124,7 +124,7 @@ def test_the_headline_joins_two_tests(paper_model, deviation, joint, named):
         Band(np.array([x]), np.array([x - half[0]]), np.array([x + half[1]]), np.ones((1, 1))) for x in (deviation, 0.0)
     ]
     contrast = replace(found.contrasts[0], stiffness=bands[0], loss_factor=bands[1])
-    assert replace(found, contrasts=(contrast,), joint=(joint, 5)).differing == named
+    assert replace(found, contrasts=(contrast,), joint=JointContrast(joint, 5)).differing == named
     unknown = replace(contrast, stiffness=replace(bands[0], root=np.empty((0, 1))), loss_factor=bands[1])
     assert replace(found, contrasts=(replace(unknown, loss_factor=unknown.stiffness),), joint=None).differing == []
 
@@ -150,7 +150,8 @@ def test_figures_are_those_of_independent_normal_errors(paper_model, freedom):
     difference = np.where(logarithmic, np.log(moved / values), moved - values)
     left = welch.min() - 4.0
     statistic = difference @ np.linalg.solve(covariance, difference) * left / (5.0 * welch.min())
-    assert found.joint == pytest.approx((fisher.sf(statistic, 5, left), 5), rel=1e-3)
+    assert found.joint
+    assert astuple(found.joint) == pytest.approx((fisher.sf(statistic, 5, left), 5), rel=1e-3)
     error = np.sqrt(np.diag(covariance))
     for i, name in enumerate(FIVE):
         row = rows(found)[name]
