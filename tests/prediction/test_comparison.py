@@ -150,8 +150,7 @@ def test_figures_are_those_of_independent_normal_errors(paper_model, freedom):
     difference = np.where(logarithmic, np.log(moved / values), moved - values)
     left = welch.min() - 4.0
     statistic = difference @ np.linalg.solve(covariance, difference) * left / (5.0 * welch.min())
-    assert found.joint
-    assert astuple(found.joint) == pytest.approx((fisher.sf(statistic, 5, left), 5), rel=1e-3)
+    assert astuple(found.joint or JointContrast(1.0, 0)) == pytest.approx((fisher.sf(statistic, 5, left), 5), rel=1e-3)
     error = np.sqrt(np.diag(covariance))
     for i, name in enumerate(FIVE):
         row = rows(found)[name]
