@@ -17,6 +17,9 @@ def template_environment(folder: Path, *, is_markup: bool = False) -> jinja2.Env
     Args:
         folder: folder of the templates.
         is_markup: True for HTML and XML, in which texts are escaped.
+
+    Returns:
+        Environment in which a missing variable is an error; cached.
     """
     import jinja2
 

@@ -59,6 +59,9 @@ def read_document(file: Path, kind: str = "a result") -> dict[str, Any]:
         file: path of the file.
         kind: name of the expected content for errors.
 
+    Returns:
+        The JSON object with its keys and values.
+
     Raises:
         ModelError: the file is missing, too large or not a JSON object, or repeats a key.
     """
