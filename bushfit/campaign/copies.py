@@ -121,8 +121,7 @@ def copied_points(sweeps: Sequence[Sweep]) -> dict[tuple[int, int], list[int]]:
     counts = Counter[object]()
     for (index, _), copied_rows in copies.items():
         counts[files[index]] += len(copied_rows)
-    enough = {pair for pair in copies if counts[files[pair[0]]] >= _FEWEST_POINTS}
-    return {pair: sorted(copies[pair]) for pair in sorted(enough)}
+    return {pair: sorted(rows) for pair, rows in sorted(copies.items()) if counts[files[pair[0]]] >= _FEWEST_POINTS}
 
 
 def _forms(sweep: Sweep) -> list[_Rows]:
@@ -177,9 +176,8 @@ def without_copied_points(sweeps: Sequence[Sweep]) -> list[Sweep]:
             sentence = f"{len(rows)} points{of_repeats} are copies of {source} and are left out; "
             sentence += "row numbers in messages do not count the copies"
             notes.append(Caveat("copied_repeats", sentence))
-        names = ("frequency", "amplitude", "stiffness", "repeat", "reached", "relative_error", "temperature")
-        columns = {name: getattr(sweep, name) for name in names}
-        columns = {name: column[~is_copy[index]] for name, column in columns.items() if isinstance(column, np.ndarray)}
+        arrays = {name: values for name, values in vars(sweep).items() if isinstance(values, np.ndarray)}
+        columns: dict[str, Any] = {name: values[~is_copy[index]] for name, values in arrays.items()}
         remaining.append(replace(sweep, source=sweep.source and sweep.source.with_notes(notes), **columns))
     return remaining
 
