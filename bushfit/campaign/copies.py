@@ -18,8 +18,9 @@ from bushfit.reading.measurement import AnyTest, Loop, Sweep, loss_factor
 
 #: Minimum number of identical points that are copies; chosen: fewer may agree by chance in rounded files.
 _FEWEST_POINTS = 5
-#: Number of significant digits that are compared; later digits contain rounding errors of unit conversions.
-_DIGITS = 9
+#: Smallest number of significant digits that are compared, because 0.1 may be a set value, and number below which later
+#: digits contain rounding errors of unit conversions.
+_DIGITS = 3, 10
 #: Distance of a number from a decimal number, in units of its last place, that is rounding of the computer.
 _ROUNDING = 1e-4
 #: Run of a sweep: index of the sweep, and repeat and level of the run (None if the sweep is one run).
@@ -39,7 +40,7 @@ class _Rows(NamedTuple):
         """Build the rows from c columns, (n,) each."""
         numbers = np.stack(columns)
         largest = np.abs(numbers).max(axis=1).clip(min=1e-300)
-        places = 10.0 ** (np.floor(np.log10(largest)) - np.arange(_DIGITS)[:, None])
+        places = 10.0 ** (np.floor(np.log10(largest)) - np.arange(*_DIGITS)[:, None] + 1.0)
         in_places = numbers[:, :_ROWS] / places[..., None]
         is_decimal = np.all(np.abs(in_places - np.round(in_places)) < _ROUNDING, axis=-1)
         is_decimal[-1] = True
