@@ -95,7 +95,7 @@ def _print_range(output: Output, outcome: RunOutput) -> None:
     """Print the tested range of frequency and amplitude for each direction, fitted or not."""
     if not (measured := outcome.result.measured):
         return
-    output.console.print("tested range (of strain: that of all fitted directions together)", style="bold")
+    output.console.print("tested range; beyond it the model extrapolates (strain: all fitted directions)", style="bold")
     for direction in dict.fromkeys(data_set.direction for data_set in outcome.data.data_sets):
         tests = [data_set for data_set in outcome.data.data_sets if data_set.direction == direction]
         frequencies = [end for test in tests for end in (test.frequency.min(), test.frequency.max())]
