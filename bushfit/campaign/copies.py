@@ -119,9 +119,7 @@ def copied_points(sweeps: Sequence[Sweep]) -> dict[tuple[int, int], list[int]]:
             copies[index, original].update(rows)
             copied.add(run)
     files = [sweep.source.file if sweep.source else sweep.name for sweep in sweeps]
-    counts = Counter[object]()
-    for (index, _), copied_rows in copies.items():
-        counts[files[index]] += len(copied_rows)
+    counts = Counter(files[index] for (index, _), copied_rows in copies.items() for _ in copied_rows)
     return {pair: sorted(rows) for pair, rows in sorted(copies.items()) if counts[files[pair[0]]] >= _FEWEST_POINTS}
 
 
