@@ -66,7 +66,7 @@ def test_the_first_block_is_what_a_customer_reads(results):
         assert 0.0 < high - low < 0.1 * static
         assert low < static < high
     for words in (
-        *("95 % of 144 held-out points", "fitted to tests in this direction", "Verdict: consistent"),
+        *("(144 held-out points)", "fitted to tests in this direction", "Verdict: consistent"),
         *("predicted from axial tests; the measured sweep agrees within its noise",),
         "Use the model within the tested range",
     ):
