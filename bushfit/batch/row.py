@@ -6,6 +6,7 @@ import json
 import time
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -37,6 +38,8 @@ if TYPE_CHECKING:
 
 #: Amount of an added effect, relative to the typical value of its parameter, up to which the effect is zero.
 _ZERO = 1e-3
+#: Limit of the threads of linear algebra, set once per process, because the rows of a batch use the cores.
+limit_threads = cache(threadpool_limits)
 
 
 @dataclass(frozen=True)
@@ -69,7 +72,7 @@ class RowTask:
         if self.version != __version__:
             problem, hint = "a worker runs another bushfit version", "install the same version on all workers"
             raise BatchError(problem, found=__version__, expected=self.version, hint=hint)
-        threadpool_limits(1)  # as the rows of a batch use the cores
+        limit_threads(1)
         settings = asdict(row.settings), asdict(self.formats), [str(point) for point in self.points]
         key = store.digest(json.dumps([__version__, ROW_SCHEMA, *settings], sort_keys=True).encode())
         if self.resume and (earlier := store.load_row(self.output, row, key)):

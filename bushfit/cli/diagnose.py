@@ -118,11 +118,11 @@ def print_verdict(output: Output, diagnosed: DiagnosisOutput, again: str, action
     lines = [use] if action and colour != "green" else []
     lines += [*diagnosed.diagnosis.summary.split("; "), *format_odds(diagnosed.document)]
     if labels := diagnosed.adoptable:
-        adopted = "".join(f" --adopt {quote_path(label)}" for label in labels)
+        exclude = {"exclude": "--without"} if diagnosed.diagnosis.verdict == "ambiguous" else {}
         source = "the records" if any(effect["correction"] for effect in diagnosed.document["effects"]) else "tests"
-        lines.append(f"if {source} confirm {join_names(labels)}: {again}{adopted}")
-        if diagnosed.diagnosis.verdict == "ambiguous":
-            lines.append(f"if {source} exclude {join_names(labels)}: {again}{adopted.replace('--adopt', '--without')}")
+        for answer, option in {"confirm": "--adopt", **exclude}.items():
+            options = "".join(f" {option} {quote_path(label)}" for label in labels)
+            lines.append(f"if {source} {answer} {join_names(labels)}: {again}{options}")
     for line in lines:
         output.console.print(f"  {escape(line)}")
 
