@@ -35,7 +35,12 @@ def _tables() -> Iterator[str]:
     yield _table(
         ("mistake", "true statement if the mistake was made", "true value", "possible in"),
         (
-            (f"`{m.name}`", m.sentence.format(files="FILE"), f"`{m.equation}`", " or ".join(m.kinds) or "[bushing]")
+            (
+                f"`{m.name}`",
+                "a wrong prefix" if m.scales else m.sentence.format(files="FILE"),
+                f"`{m.equation}`",
+                "both" if len(m.kinds) > 1 else "".join(m.kinds) or "[bushing]",
+            )
             for m in MISTAKES.values()
         ),
     )

@@ -170,7 +170,7 @@ def possible_mistakes(data: PreparedCampaign, without: Collection[str]) -> list[
             for index, data_set in enumerate(data_sets)
             if option_label(kind.name, data_set.name) not in without
             and kind.possible(data_set.test)
-            and kind.explains(data_set.test, float(moduli[index]), float(strains[index]))
+            and kind.explains(float(moduli[index]), float(strains[index]))
         ]
         groups: list[tuple[int, ...]] = [(index,) for index in indices]
         groups += [tuple(index for index in indices if mark in shared[index]) for mark in marks]

@@ -45,10 +45,12 @@ class Mistake(Effect):
         sweep_line: `line` for a sweep, if it differs.
         kinds: kinds of tests in which the mistake occurs; empty for a mistake in [bushing].
         motion: type of motion of these tests (translation or rotation); None for any.
-        displacement, force, time: ratios of the true to the stated quantity in a test.
+        displacement, force, time: ratios of the true to the stated quantity in a test. The stiffness of a sweep was
+            computed from force and displacement, so its ratio is force/displacement.
+        amplitude: ratio of the true to the stated amplitude of a sweep whose stiffness is true.
         inner_radius, outer_radius, length: ratios of the true to the stated dimension in [bushing].
         stiffness: function from the stated to the true complex stiffness of a sweep, (n,) -> (n,) [N/m], for mistakes
-            that the three ratios cannot describe; None otherwise.
+            that these ratios cannot describe; None otherwise.
         doubt: function that returns True if the stated complex stiffness, (n,), permits the mistake; None for always.
         swaps: True if axial and radial are interchanged.
         scales: True for a factor that is a power of 1000, which is possible only if the test as stated is implausible
@@ -65,6 +67,7 @@ class Mistake(Effect):
     displacement: float = 1.0
     force: float = 1.0
     time: float = 1.0
+    amplitude: float = 1.0
     inner_radius: float = 1.0
     outer_radius: float = 1.0
     length: float = 1.0
@@ -85,12 +88,15 @@ class Mistake(Effect):
         if isinstance(test, Loop):
             motion, force = self.displacement * test.displacement, self.force * test.force
             return replace(test, direction=direction, time=self.time * test.time, displacement=motion, force=force)
+        factor = self.displacement * self.amplitude
         return replace(
             test,
             direction=direction,
-            amplitude=self.displacement * test.amplitude,
-            reached=None if test.reached is None else self.displacement * test.reached,
-            stiffness=self.force * (self.stiffness(test.stiffness) if self.stiffness else test.stiffness),
+            amplitude=factor * test.amplitude,
+            reached=None if test.reached is None else factor * test.reached,
+            stiffness=self.force
+            / self.displacement
+            * (self.stiffness(test.stiffness) if self.stiffness else test.stiffness),
         )
 
     def corrected_harmonic(self, cycle: Sweep) -> Sweep:
@@ -114,11 +120,10 @@ class Mistake(Effect):
         doubtful = self.doubt is None or (isinstance(test, Sweep) and self.doubt(test.stiffness))
         return fits and doubtful and not (self.swaps and place not in _EXCHANGED)
 
-    def explains(self, test: Loop | Sweep, modulus: float, strain: float) -> bool:
+    def explains(self, modulus: float, strain: float) -> bool:
         """True if the correction of a factor of 1000 makes a recording plausible that is implausible for rubber.
 
         Args:
-            test: the test as stated.
             modulus: shear modulus that the test as stated implies [Pa].
             strain: largest strain amplitude as stated [-].
 
@@ -127,8 +132,8 @@ class Mistake(Effect):
         """
         if not self.scales:
             return True
-        factor = self.force / self.displacement if isinstance(test, Loop) else self.force
-        return not _is_of_rubber(modulus, strain) and _is_of_rubber(factor * modulus, self.displacement * strain)
+        corrected = self.force / self.displacement * modulus, self.displacement * self.amplitude * strain
+        return not _is_of_rubber(modulus, strain) and _is_of_rubber(*corrected)
 
     def _direction(self, place: Place) -> Place:
         """True direction of a test that states `place`: the other one if the mistake swaps axial and radial."""
@@ -207,8 +212,12 @@ _LAWS: dict[str, Any] = {
 def _build_mistake(name: str, entry: dict[str, Any]) -> Mistake:
     """Build a mistake from its name and its table in mistakes.toml."""
     laws = {key: _LAWS[entry.pop(key)] for key in ("stiffness", "doubt", "motion") if key in entry}
-    kinds, units = tuple(entry.pop("kinds", ["sweep"])), entry.pop("units", {}).items()
-    lines = [f'units = {{ {key} = "{unit}" }}, and the same unit in the header, if any' for key, unit in units]
+    kinds, lines = tuple(entry.pop("kinds", ["sweep"])), []
+    for units in entry.pop("units", []):
+        stated = ", ".join(f'{key} = "{unit}"' for key, unit in units.items())
+        lines.append(
+            f"units = {{ {stated} }}, and the same {'unit' if len(units) == 1 else 'units'} in the header, if any"
+        )
     entry |= laws | dict(zip(("line", "sweep_line"), lines, strict=False))
     return Mistake(name=name, kinds=kinds, **entry)
 

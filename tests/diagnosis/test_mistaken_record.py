@@ -1,7 +1,4 @@
-"""Mistakes in the record of the paper's bushing on the rig: told, never mended unless adopted, and not made up.
-
-A sweep in one file, or with a file for each level as many rigs write it, is the same to a diagnosis.
-"""
+"""Mistakes in the record of the paper's bushing on the rig are stated, and corrected only if the user adopts them."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -39,7 +36,6 @@ def on_loops(change: Callable[[Loop], Loop], *numbers: int) -> Tamper:
 
 
 def sized(**factors: float) -> Tamper:
-    """Dimensions in [bushing] stated wrong by these factors."""
     return lambda c: replace(
         c, bushing=replace(c.bushing, **{key: factor * getattr(c.bushing, key) for key, factor in factors.items()})
     )
@@ -56,9 +52,9 @@ MADE: dict[str, Tamper] = {
     ),
     "other_direction:sweep_radial": on_sweeps(lambda s: replace(s, direction=Direction.AXIAL), 1),
     "diameters": sized(inner_radius=2.0, outer_radius=2.0),
-    "outer_diameter": sized(outer_radius=2.0),
-    "inner_radius_halved": sized(inner_radius=0.5),
-    "length_in_centimetres": sized(length=0.1),
+    "inch:sweep_axial inch:sweep_radial": on_sweeps(
+        lambda s: replace(s, amplitude=s.amplitude / 25.4, stiffness=25.4 * s.stiffness), 0, 1
+    ),
 }
 
 
@@ -74,7 +70,6 @@ def test_a_mistake_is_named_with_the_line_that_puts_it_right(truth, measured):
         assert entry["correction"] in diagnosis.next_test
     before, after = diagnosis.calibration
     assert after < 1.02 < before - 0.02  # root mean squares over thousands of rows of loops, which agree
-    # nothing is mended: the model to use is that of the tests as they are, and says so
     assert diagnosis.result.model is diagnosis.before.model
     assert not diagnosis.added
     assert any("fitted to the tests as they are" in warning for warning in map(str, diagnosis.result.warnings))
@@ -87,9 +82,9 @@ def test_a_mistake_is_named_with_the_line_that_puts_it_right(truth, measured):
 
 #: Factors of the stated displacement and force, by the mistake in a test that strains rubber beyond all limits.
 IMPOSSIBLE = {
-    f"{name}_displacement:{test}": factor
+    f"{name}_{test}": factor
     for name, factor in (("thousandth_of", 1e3), ("millionth_of", 1e6))
-    for test in ("loop_axial_1", "sweep_axial")
+    for test in ("displacement:loop_axial_1", "displacement:sweep_axial", "amplitude:sweep_axial")
 }
 
 
@@ -97,7 +92,8 @@ IMPOSSIBLE = {
 def test_where_no_fit_can_begin_the_option_is_offered_that_corrects_the_unit(truth, measured):
     factor = IMPOSSIBLE[truth]
     of_loop = on_loops(lambda x: replace(x, displacement=factor * x.displacement), 0)
-    of_sweep = on_sweeps(lambda s: replace(s, amplitude=factor * s.amplitude), 0)
+    of_channel = 1.0 / factor if "displacement" in truth else 1.0
+    of_sweep = on_sweeps(lambda s: replace(s, amplitude=factor * s.amplitude, stiffness=of_channel * s.stiffness), 0)
     campaign = (of_loop if "loop" in truth else of_sweep)(measured(None, SHARED))
     with pytest.raises(FitError, match=f"--adopt {truth} corrects it"):
         asked(campaign)
@@ -166,7 +162,8 @@ def test_amplitudes_rates_units_and_directions_are_mended():
     assert MISTAKES["peak_to_peak"].corrected_test(LOOP) is None
     assert mended("sixty_times_faster", LOOP).time == pytest.approx(LOOP.time / 60.0)
     assert mended("pound_force", LOOP).force == pytest.approx(4.4482216 * LOOP.force)
-    assert mended("inch", LOOP).displacement == pytest.approx(25.4 * LOOP.displacement)
+    assert mended("inch", swept(0.1)).stiffness == pytest.approx(swept(0.1).stiffness / 25.4)
+    assert mended("inch_amplitude", swept(0.1)).stiffness == pytest.approx(swept(0.1).stiffness)
     assert mended("other_direction", LOOP).direction is Direction.RADIAL
     tube = MISTAKES["diameters"].corrected_bushing(Bushing("tube", 0.02, 0.036, 0.034))
     assert tube == Bushing("tube", 0.01, 0.018, 0.034)
