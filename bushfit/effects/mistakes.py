@@ -50,7 +50,7 @@ class Mistake(Effect):
         amplitude: ratio of the true to the stated amplitude of a sweep whose stiffness is true.
         inner_radius, outer_radius, length: ratios of the true to the stated dimension in [bushing].
         stiffness: function from the stated to the true complex stiffness of a sweep, (n,) -> (n,) [N/m], for mistakes
-            that these ratios cannot describe; None otherwise.
+            that these ratios cannot describe; the identity otherwise.
         doubt: function that returns True if the stated complex stiffness, (n,), permits the mistake; None for always.
         swaps: True if axial and radial are interchanged.
         scales: True for a factor that is a power of 1000, which is possible only if the test as stated is implausible
@@ -71,7 +71,7 @@ class Mistake(Effect):
     inner_radius: float = 1.0
     outer_radius: float = 1.0
     length: float = 1.0
-    stiffness: Callable[[Complex], Complex] | None = None
+    stiffness: Callable[[Complex], Complex] = np.positive
     doubt: Callable[[Complex], bool] | None = None
     swaps: bool = False
     scales: bool = False
@@ -88,15 +88,13 @@ class Mistake(Effect):
         if isinstance(test, Loop):
             motion, force = self.displacement * test.displacement, self.force * test.force
             return replace(test, direction=direction, time=self.time * test.time, displacement=motion, force=force)
-        factor = self.displacement * self.amplitude
+        factor, stiffness = self.displacement * self.amplitude, self.stiffness(test.stiffness)
         return replace(
             test,
             direction=direction,
             amplitude=factor * test.amplitude,
             reached=None if test.reached is None else factor * test.reached,
-            stiffness=self.force
-            / self.displacement
-            * (self.stiffness(test.stiffness) if self.stiffness else test.stiffness),
+            stiffness=self.force / self.displacement * stiffness,
         )
 
     def corrected_harmonic(self, cycle: Sweep) -> Sweep:
@@ -130,10 +128,8 @@ class Mistake(Effect):
         Returns:
             True if the recording becomes plausible; always True for mistakes that are not a factor of a power of 1000.
         """
-        if not self.scales:
-            return True
         corrected = self.force / self.displacement * modulus, self.displacement * self.amplitude * strain
-        return not _is_of_rubber(modulus, strain) and _is_of_rubber(*corrected)
+        return not self.scales or (_is_of_rubber(*corrected) and not _is_of_rubber(modulus, strain))
 
     def _direction(self, place: Place) -> Place:
         """True direction of a test that states `place`: the other one if the mistake swaps axial and radial."""
@@ -212,12 +208,8 @@ _LAWS: dict[str, Any] = {
 def _build_mistake(name: str, entry: dict[str, Any]) -> Mistake:
     """Build a mistake from its name and its table in mistakes.toml."""
     laws = {key: _LAWS[entry.pop(key)] for key in ("stiffness", "doubt", "motion") if key in entry}
-    kinds, lines = tuple(entry.pop("kinds", ["sweep"])), []
-    for units in entry.pop("units", []):
-        stated = ", ".join(f'{key} = "{unit}"' for key, unit in units.items())
-        lines.append(
-            f"units = {{ {stated} }}, and the same {'unit' if len(units) == 1 else 'units'} in the header, if any"
-        )
+    kinds, units = tuple(entry.pop("kinds", ["sweep"])), entry.pop("units", [])
+    lines = [f"units = {{ {stated} }}, and the same in the header, if any" for stated in units]
     entry |= laws | dict(zip(("line", "sweep_line"), lines, strict=False))
     return Mistake(name=name, kinds=kinds, **entry)
 
