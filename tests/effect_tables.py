@@ -33,11 +33,11 @@ def _tables() -> Iterator[str]:
         ((f"`{e.name}`", ", ".join(f"`{twin}` ({get_effect(twin).level})" for twin in e.twins)) for e in twinned),
     )
     yield _table(
-        ("mistake", "true statement if the mistake was made", "true value", "possible in"),
+        ("mistake", "what is true", "true value", "tests"),
         (
             (
                 f"`{m.name}`",
-                "a wrong prefix" if m.scales else m.sentence.format(files="FILE"),
+                "wrong prefix" if m.scales else m.sentence.format(files="FILE"),
                 f"`{m.equation}`",
                 "both" if len(m.kinds) > 1 else "".join(m.kinds) or "[bushing]",
             )

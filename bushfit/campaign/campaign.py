@@ -252,23 +252,25 @@ def model_of(campaign: Campaign) -> Model:
 
 def refuse_tests(paths: Sequence[Path]) -> None:
     """Raise a CampaignError if the paths are test files, a folder or a model file instead of a campaign."""
-    first = paths[0]
+    model = paths[0]
     try:
         tests = [path for path in paths if path.is_dir() or (path.suffix.lower() in TEST_FILES and path.exists())]
-        is_model = first.suffix.lower() == ".json" and first.exists()
+        campaigns = [quote_path(path) for folder in tests for path in sorted(folder.glob("*.toml"))]
+        if not tests and not (model.suffix.lower() == ".json" and model.exists()):
+            return
     except OSError:  # a locked folder, or a name that is too long: the reader reports it
         return
-    if not (tests or is_model):
-        return
-    expected = "a .toml file that names the bushing and its tests"
+    found, hint = "a model", f"to predict from a model: bushfit predict {quote_path(model)}"
     if tests:
         found = "a folder" if tests[0].is_dir() else "a test file" if len(tests) == 1 else "test files"
         sizes = '--inner-radius "10 mm" --outer-radius "18 mm" --length "34 mm"'
-        command = f"bushfit init {' '.join(map(quote_path, tests))} {sizes}"
-        hint = f"to write one, with the dimensions of your rubber: {command}"
-    else:
-        found, hint = "a model", f"to predict from a model: bushfit predict {quote_path(first)}"
-    raise CampaignError("a campaign is needed", file=(tests or paths)[0], found=found, expected=expected, hint=hint)
+        hint = (
+            f"to write one, with the dimensions of your rubber: bushfit init {' '.join(map(quote_path, tests))} {sizes}"
+        )
+    if campaigns:
+        hint = f"give the campaign of the folder: {' or '.join(campaigns)}"
+    expected = "a .toml file that names the bushing and its tests"
+    raise CampaignError("a campaign is needed", file=[*tests, model][0], found=found, expected=expected, hint=hint)
 
 
 def reader_keywords(

@@ -46,7 +46,7 @@ class Mistake(Effect):
         kinds: kinds of tests in which the mistake occurs; empty for a mistake in [bushing].
         motion: type of motion of these tests (translation or rotation); None for any.
         displacement, force, time: ratios of the true to the stated quantity in a test. The stiffness of a sweep was
-            computed from force and displacement, so its ratio is force/displacement.
+            computed from force and displacement, so its ratio is force/displacement; that of its frequency is 1/time.
         amplitude: ratio of the true to the stated amplitude of a sweep whose stiffness is true.
         inner_radius, outer_radius, length: ratios of the true to the stated dimension in [bushing].
         stiffness: function from the stated to the true complex stiffness of a sweep, (n,) -> (n,) [N/m], for mistakes
@@ -92,6 +92,7 @@ class Mistake(Effect):
         return replace(
             test,
             direction=direction,
+            frequency=test.frequency / self.time,
             amplitude=factor * test.amplitude,
             reached=None if test.reached is None else factor * test.reached,
             stiffness=self.force / self.displacement * stiffness,
