@@ -98,7 +98,9 @@ def _print_comparison(output: Output, name: str, compared: ComparisonOutput) -> 
         action = f"next: {output.command(f'fit {quote_path(source.source)}{effects}', source.name)}"
         sentences = [*advice, *notes, *(compared.words if output.verbose else ())]
     else:
-        differing = zip(labels, (comparison.differing for comparison in compared.comparisons), strict=True)
+        differing = zip(
+            labels, (comparison.significant_differences for comparison in compared.comparisons), strict=True
+        )
         called = {entry.label: f"{entry.label} ({entry.name})" for entry in content.compared}
         different = [
             f"{called[label]} differs from {called[first]} in {join_names(names)}"

@@ -215,7 +215,7 @@ def close_gap(search: Search, finding: Finding, hypotheses: Sequence[Hypothesis]
         search: completed search, with the tests.
         finding: verdict, with the explanations to report.
         hypotheses: all hypotheses that were compared, the most probable first.
-        base: fit of the starting model without the assumed gain errors of loops, see `with_free_gains`.
+        base: fit of the starting model without the assumed gain errors of loops, see `without_assumed_gain_errors`.
 
     Returns:
         The fit, the smooth correction, and the misfit of held-out tests where the two are compared.
@@ -226,7 +226,7 @@ def close_gap(search: Search, finding: Finding, hypotheses: Sequence[Hypothesis]
         "ambiguous": any(composition.faulty_parts or composition.best.mistake for composition in reported),
     }
     certain, amounts = _fit_certain(search, finding, hypotheses)
-    fit, gap = base if certain is search.base else with_free_gains(certain, data), None
+    fit, gap = base if certain is search.base else without_assumed_gain_errors(certain, data), None
     if search.settings.max_effects and verdict not in ("named", "unexplained") and not may_be_wrong.get(verdict):
         rig, has_candidates = data.campaign.rig, verdict == "ambiguous"
         gap = describe_gap(fit, rig, search.start, data.bounds, before=base, has_candidates=has_candidates)
@@ -260,8 +260,8 @@ def _fit_certain(
     return fit_model(model.with_values(added), base.data_sets, [*base.fixed, *added], bounds), covariance
 
 
-def with_free_gains(fit: FitResult, data: PreparedCampaign) -> FitResult:
-    """Refit a model without the gain error of loops that bushfit assumes; keep the fit if the campaign states one."""
+def without_assumed_gain_errors(fit: FitResult, data: PreparedCampaign) -> FitResult:
+    """Refit with weights that exclude an assumed gain error of loops; return the same fit if [rig] states the error."""
     gain_is_stated = data.campaign.rig.stiffness_errors[0] is not None
     if gain_is_stated or not any(loop.gain_weighs for loop in split_by_kind(fit.data_sets)[0]):
         return fit

@@ -75,7 +75,10 @@ class FittedFamily:
 
     @property
     def sentence(self) -> str:
-        """Sentence that compares the root mean square held-out residual of the family with that of the first family."""
+        """Sentence that compares the held-out error of this model family with that of the campaign's own model.
+
+        The held-out error is the root mean square residual of tests that were left out of the fit, in units of noise.
+        """
         if self.gain is None or self.p is None or self.holdout.before is None or self.holdout.after is None:
             return "no part of the tests can be held out of both fits"
         figures = (

@@ -312,7 +312,7 @@ def _frequencies(fit: FitResult, sweeps: Sequence[MeasuredSweep]) -> Iterator[Fa
 
 
 def _scopes(sweeps: Sequence[MeasuredSweep]) -> Iterator[tuple[str, str, Sequence[MeasuredSweep]]]:
-    """Generate the signatures of sweeps that may have a common fault: each sweep, all of a direction, and all sweeps.
+    """Generate the sets of sweeps that may have a common fault: each sweep, all sweeps of a direction, all sweeps.
 
     Yields:
         Text on the location, such as a direction; text on the sweeps; and the sweeps.

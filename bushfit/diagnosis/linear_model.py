@@ -204,14 +204,17 @@ class LinearModel:
             likeliest = max(np.unique(sizes), key=lambda size: share[sizes == size].sum())
             likely = np.flatnonzero(share > _NEGLIGIBLE)
             combinations = self.rig.combinations[1][self.cases][deviates]
-            changes = self.compound.largest_changes(amounts[deviates][likely], combinations[likely])
+            changes = self.compound.squared_changes(amounts[deviates][likely], combinations[likely])
             with_compound = Evidence(log_evidence, float(np.sqrt(share[likely] @ changes)), float(likeliest))
         plain = np.logaddexp.reduce(base[self.rig.is_plain[self.cases]])
         return Evidence(float(plain), 0.0, 0.0, with_compound)
 
     @property
     def log_evidence_with_level_errors(self) -> float:
-        """Natural log of the evidence with errors shared by each amplitude or frequency beyond the rig's accuracy."""
+        """Natural log of the tests' evidence if the rig's errors of whole levels may exceed its accuracy class.
+
+        A level is the set of all points of a sweep at one constant amplitude or frequency.
+        """
         wide = ~self.rig.is_plain & (self.rig.deviation == 0.0)
         return float(np.logaddexp.reduce(self.evidence_by_case[0][wide[self.cases]]))
 

@@ -1,6 +1,6 @@
 """Regions of frequency and amplitude in which model and measurement disagree, ranked and described as sentences.
 
-A line is the set of points of a sweep at one constant amplitude, or at one constant frequency, over its repeats.
+A level is the set of all points of a sweep at one constant amplitude, or at one constant frequency, over its repeats.
 """
 
 from collections.abc import Iterator, Sequence
@@ -109,18 +109,18 @@ def find_regions(fit: FitResult) -> tuple[MisfitRegion, ...]:
 def _sweep_regions(fit: FitResult) -> Iterator[MisfitRegion]:
     """Yield for each direction the regions where the storage and the loss of sweeps deviate smoothly from the model."""
     _, sweeps = split_by_kind(fit.data_sets)
-    lines = [line for sweep in sweeps for line in level_misfits(sweep, fit.model)]
-    kinds = [(line.sweep.direction, line.sweep.test.stepped) for line in lines]
+    levels = [level for sweep in sweeps for level in level_misfits(sweep, fit.model)]
+    kinds = [(level.sweep.direction, level.sweep.test.stepped) for level in levels]
     for direction, stepped in dict.fromkeys(kinds):
-        mine = [line for line, kind in zip(lines, kinds, strict=True) if kind == (direction, stepped)]
+        mine = [level for level, kind in zip(levels, kinds, strict=True) if kind == (direction, stepped)]
         for part, name in enumerate(_PARTS):
-            pieces = [(np.real if part == 0 else np.imag)(line.smooth) for line in mine]
-            sizes = [piece / line.noise[part] for piece, line in zip(pieces, mine, strict=True)]
+            pieces = [(np.real if part == 0 else np.imag)(level.smooth) for level in mine]
+            sizes = [piece / level.noise[part] for piece, level in zip(pieces, mine, strict=True)]
             excess = float(np.sqrt(np.mean(np.square(np.concatenate(sizes)))))
             strongest = max(float(np.abs(size).max()) for size in sizes)
             if max(float(np.abs(piece).max()) for piece in pieces) < _LEAST:
                 continue
-            strong = [line.rows[np.abs(size) > _STRONG * strongest] for line, size in zip(mine, sizes, strict=True)]
+            strong = [level.rows[np.abs(size) > _STRONG * strongest] for level, size in zip(mine, sizes, strict=True)]
             touched = [i for i, rows in enumerate(strong) if rows.size]
             band, span = (
                 (min(float(values.min()) for values in points), max(float(values.max()) for values in points))
@@ -134,7 +134,7 @@ def _sweep_regions(fit: FitResult) -> Iterator[MisfitRegion]:
 
 def _describe_sweep_misfit(
     part: str,
-    lines: Sequence[LevelMisfit],
+    levels: Sequence[LevelMisfit],
     pieces: Sequence[Array],
     touched: Sequence[int],
     spans: tuple[tuple[float, float], tuple[float, float]],
@@ -143,50 +143,52 @@ def _describe_sweep_misfit(
 
     Args:
         part: "storage" or "loss".
-        lines: misfits at the levels (constant amplitudes or frequencies) of the sweeps of one direction.
+        levels: misfits at the levels (constant amplitudes or frequencies) of the sweeps of one direction.
         pieces: smooth misfit along each level, measured minus model relative to |K|, (n,) each.
         touched: indices of the levels that belong to the region.
         spans: lowest and highest frequency [Hz], and amplitude [m or rad], of the region.
     """
     quantity = "stiffness" if part == "storage" else "loss"
-    labels = [line.label for line in lines]
+    labels = [level.label for level in levels]
     if len({*labels}) < len(labels):  # sweeps at several temperatures
-        labels = [line.sweep.name for line in lines]
+        labels = [level.sweep.name for level in levels]
     worst = max(touched, key=lambda i: float(np.abs(pieces[i]).max()))
     largest = max(pieces[worst].tolist(), key=abs)
     sides = ("above", "below") if largest > 0 else ("below", "above")
-    line, direction, stepped = lines[worst], lines[worst].sweep.direction, lines[worst].sweep.test.stepped
+    level, direction, stepped = levels[worst], levels[worst].sweep.direction, levels[worst].sweep.test.stepped
     fixed_axis = {"frequency": "amplitude", "amplitude": "frequency", None: "run"}[stepped]
     across = [i for i, piece in enumerate(pieces) if np.max(-np.sign(largest) * piece) > _STRONG * abs(largest)]
     agreeing = [i for i in touched if i == worst or i not in across]
-    is_everywhere = len(agreeing) == len(lines)
+    is_everywhere = len(agreeing) == len(levels)
     unit, factor = ("Hz", 1.0) if stepped != "amplitude" else direction.display.displacement
 
-    def name_levels(found: Sequence[int]) -> str:
-        """Name levels by their amplitude or frequency, without repetition."""
-        return ", ".join(dict.fromkeys(labels[i] for i in found))
+    def name_levels(indices: Sequence[int]) -> str:
+        """List the amplitudes or frequencies of levels, given by their indices, without repetition."""
+        return ", ".join(dict.fromkeys(labels[i] for i in indices))
 
-    def range_on_side(found: Sequence[int], sign: float) -> str:
-        """Range of the points of some levels whose misfit has the given sign and is not small."""
-        steps = [lines[i].step[sign * pieces[i] > _STRONG * abs(largest)] for i in found]
+    def range_on_side(indices: Sequence[int], sign: float) -> str:
+        """Text with the range of the points of some levels whose misfit has the given sign and is not small."""
+        steps = [levels[i].step[sign * pieces[i] > _STRONG * abs(largest)] for i in indices]
         ends = np.concatenate(steps)
         return format_range(unit, factor * float(ends.min()), factor * float(ends.max()))
 
     span = format_range(unit, *(factor * end for end in spans[stepped == "amplitude"]))
     if across:
         span = range_on_side(agreeing, np.sign(largest))
-    levels = f"every {fixed_axis}" if is_everywhere and len(lines) > 1 else name_levels(agreeing)
+    level_names = f"every {fixed_axis}" if is_everywhere and len(levels) > 1 else name_levels(agreeing)
     size = number(100 * abs(largest), 2)
-    sentences = [f"measured {direction} {quantity} is up to {size} % of |K| {sides[0]} the model ({span}, at {levels})"]
+    sentences = [
+        f"measured {direction} {quantity} is up to {size} % of |K| {sides[0]} the model ({span}, at {level_names})"
+    ]
     means = [float(np.mean(piece)) for piece in pieces]
     if across:
         span = range_on_side(across, -np.sign(largest))
         sentences.append(f"It is {sides[1]} the model ({span}, at {name_levels(across)})")
     elif is_everywhere and len(means) > 1 and np.ptp(means) >= _CHANGES * max(abs(mean) for mean in means):
         sentences.append(f"The gap {_trend_verb(means[0], means[-1])} with {fixed_axis}")
-    trend = _trend(stepped or "frequency", line.step, pieces[worst])
+    trend = _trend(stepped or "frequency", level.step, pieces[worst])
     several = len(agreeing) > 1 and stepped
-    sentences.append(f"The gap is largest at {line.label}, where it {trend}" if several else f"The gap {trend}")
+    sentences.append(f"The gap is largest at {level.label}, where it {trend}" if several else f"The gap {trend}")
     return ". ".join(sentences)
 
 

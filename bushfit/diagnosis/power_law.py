@@ -4,8 +4,7 @@ Notes:
     The power law is a stiffness A e^(i phi) (f/f0)^p (X/X0)^q that is added to the model (a term) and fitted together
     with all parameters. For each pair of powers p and q on a grid, the residuals are linearised in its parts in phase
     and in quadrature, around the parameters of the most probable pair. The evidence of each pair and its amounts form
-    the posterior from which phase and powers are drawn. The evidence of smooth curves of any form decides whether the
-    gap is a power law at all.
+    the posterior from which phase and powers are drawn. A law is likely if its evidence exceeds that of smooth curves.
 """
 
 from __future__ import annotations
@@ -77,13 +76,7 @@ _QUANTITIES: dict[Quantity, str] = {
     "modulus": "equal as a modulus over strain",
     "gain": "equal in % of |K| in every direction",
 }
-_QUARTERS = {
-    0: "adds stiffness",
-    90: "adds loss",
-    180: "lowers stiffness",
-    -180: "lowers stiffness",
-    -90: "lowers loss",
-}
+_PHASES = {0: "adds stiffness", 90: "adds loss", 180: "lowers stiffness", -180: "lowers stiffness", -90: "lowers loss"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +116,7 @@ class PowerLaw:
         A phase, power or unit that the tests do not determine is left out.
         """
         phase, low, high = self.phase_deg
-        near = next((text for quarter, text in _QUARTERS.items() if low <= quarter <= high), "")
+        near = next((text for quarter, text in _PHASES.items() if low <= quarter <= high), "")
         turned = np.exp(1j * np.radians(phase))
         stiffness, loss = ("adds" if part > 0.0 else "lowers" for part in (turned.real, turned.imag))
         parts = [near or f"{stiffness} stiffness and {loss} loss"] * self.determined[0]
@@ -179,11 +172,8 @@ class Term:
     @cached_property
     def points(self) -> Array:
         """Centred natural logs of frequency and motion (displacement, rotation or strain) at each point, (p, 2)."""
-        model, over_strain = self.fit.model, self.quantity != "stiffness"
-        axes = [
-            (test.frequency, test.amplitude * (model.unit_strain(test.direction) if over_strain else 1.0))
-            for test, _ in self.tests
-        ]
+        strain = self.fit.model.unit_strain if self.quantity != "stiffness" else lambda _: 1.0
+        axes = [(test.frequency, test.amplitude * strain(test.direction)) for test, _ in self.tests]
         points = np.log(np.concatenate(axes, axis=-1).T)
         return points - points.mean(axis=0)
 
@@ -370,9 +360,8 @@ def _settled_grid(
             return grid
         reach = _REACH * spread + step + np.where(np.isfinite(shift), shift, 0.0)
         ends = np.clip(np.stack((middle - reach, middle + reach)), *limits)
-        model, value = _gauss_newton_step(
-            Term(fitted, term.quantity), model, value, np.exp(middle @ term.points.T)[None], bounds
-        )
+        shape, fitted_term = np.exp(middle @ term.points.T)[None], Term(fitted, term.quantity)
+        model, value = _gauss_newton_step(fitted_term, model, value, shape, bounds)
     return None
 
 

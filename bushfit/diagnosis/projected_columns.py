@@ -98,11 +98,12 @@ class CompoundDeviation:
 
     @cached_property
     def modes(self) -> tuple[Array, Array]:
-        """Eigenvalues and eigenvectors of D^T S^-1 D for the q residual columns D, with the residuals' covariance S.
+        """Modes of the deviation: combinations of its q patterns whose amounts are independent given the rig's errors.
 
         Returns:
-            Eigenvalues, (combinations, q), and eigenvectors, (combinations, q, q), for each combination of sizes of the
-            rig's errors.
+            Eigenvalues, (combinations, q), and eigenvectors, (combinations, q, q), of D^T S^-1 D for each combination
+            of assumed sizes of the rig's errors. D are the changes of the residuals by the q patterns, and S is the
+            covariance of the residuals.
         """
         values, vectors = np.linalg.eigh(self.rows.inner(self.rows, np.arange(len(self.rig.combinations[0]))))
         return np.maximum(values, 0.0), vectors
@@ -119,15 +120,15 @@ class CompoundDeviation:
         """
         return self.modes[1][combinations].swapaxes(1, 2) @ self.rows.inner(rows, combinations)
 
-    def largest_changes(self, amounts: Array, combinations: Array) -> Array:
-        """Square of the largest relative change of |K| by a deviation with given amounts of its modes.
+    def squared_changes(self, amounts: Array, combinations: Array) -> Array:
+        """Squared relative change of |K| by the deviation, at the operating point where the deviation is largest.
 
         Args:
-            amounts: amounts of the q modes, (cases, q).
-            combinations: index of the assumed sizes of the rig's errors in each case, (cases,).
+            amounts: amount of each of the q `modes` in each noise case, (cases, q).
+            combinations: index of the rig errors that each noise case assumes in `RigErrors.combinations`, (cases,).
 
         Returns:
-            Squared relative change, (cases,).
+            Squared relative change in each noise case, (cases,).
         """
         changes = np.einsum("nij,nj->ni", self.modes[1][combinations], amounts) @ self.signature.stiffness_change
         return np.square(np.abs(changes)).max(axis=-1)

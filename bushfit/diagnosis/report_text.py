@@ -12,7 +12,7 @@ from functools import reduce
 import numpy as np
 
 from bushfit.caveat import Caveat, join_names
-from bushfit.diagnosis.closing import Closing, close_gap, with_free_gains
+from bushfit.diagnosis.closing import Closing, close_gap, without_assumed_gain_errors
 from bushfit.diagnosis.document import Verdict
 from bushfit.diagnosis.explanation_text import (
     causes_text,
@@ -60,7 +60,7 @@ class DiagnosisWriter:
         search: completed search, with the tests and the starting model fitted to them.
         finding: verdict on the hypotheses, with the explanations to report.
         hypotheses: all hypotheses that were compared, the most probable first.
-        base: fit of the starting model without the assumed gain errors of loops, see `with_free_gains`.
+        base: fit of the starting model without the assumed gain errors of loops, see `without_assumed_gain_errors`.
     """
 
     search: Search
@@ -139,7 +139,7 @@ class DiagnosisWriter:
         summary = f"probable mistake in the record: {mistake.sentence}"
         if self.finding.verdict == "ambiguous":
             summary += "; correct this first: the tests do not decide yet what else is missing"
-        after = with_free_gains(best.state.plain, self.search.data)
+        after = without_assumed_gain_errors(best.state.plain, self.search.data)
         closing = Closing(base, holdout=hold_out(base, after, self.search.data.bounds))
         diagnosis = self._build(closing, summary, self._record_entries(first), places=best, next_test=advice)
         warning = Caveat("mistaken_record", f"fitted to the tests as they are; probable mistake: {mistake.sentence}")

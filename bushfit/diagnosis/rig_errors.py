@@ -124,15 +124,17 @@ class RigErrors:
 
     @cached_property
     def kernels(self) -> tuple[Array, Array]:
-        """Matrices that correct inner products, weighted by the random noise, for the errors that residuals share.
+        """Matrices K by which inner products of residuals are corrected for the errors that a block of them shares.
 
         Returns:
-            K = D (1 + D W N^-1 W^T D)^-1 D of each block and each combination of sizes, (blocks, combinations, w, w):
-            N are the noise variances, W the changes of the residuals by the w shared errors of the block, and D the
-            sizes of these errors; and the natural log of the determinant of the covariance, (combinations,).
+            K = D (1 + D W N^-1 W^T D)^-1 D for each block and each combination of sizes in `combinations`, (blocks,
+            combinations, w, w): N are the variances of the random noise, W the changes of the residuals by the w shared
+            errors of the block, and D the sizes of these errors. Then the natural log of the determinant of the
+            residuals' covariance, (combinations,).
 
         Notes:
-            The covariance is S = N + W^T D^2 W, so R S^-1 R^T = R N^-1 R^T - (W N^-1 R^T)^T K (W N^-1 R^T) for rows R.
+            The covariance is S = N + W^T D^2 W, so R S^-1 R^T = R N^-1 R^T - (W N^-1 R^T)^T K (W N^-1 R^T) for rows R
+            (Woodbury identity).
         """
         sizes, _ = self.combinations
         weights, scatter = self.weights

@@ -143,12 +143,14 @@ class Search:
             limit = max(hypothesis.log_posterior for hypothesis in followed) - LOG_ODDS_CUTOFF
             nearest = sorted(fresh, key=lambda state: -state.log_posterior)
             beam = [state for state in nearest[: BEAM[min(depth, 1)]] if state.log_posterior > limit]
-            corrected = dict[tuple[int, ...], SearchState]()  # the most probable one with a mistake in these tests
-            for state in nearest:
-                if state.tests.mistake:
-                    corrected.setdefault(state.tests.mistake.tests, state)
-            for state in [*corrected.values()][:_CORRECTED]:
-                if state not in beam and self._is_improved(state):
+            corrected = dict[tuple[int, ...], tuple[SearchState, frozenset[Hashable]]]()
+            for state in nearest:  # the most probable one with a mistake in these tests
+                if mistake := state.tests.mistake:
+                    corrected.setdefault(mistake.tests, (state, state.key - {mistake.key}))
+            for state, key in [*corrected.values()][:_CORRECTED]:
+                as_recorded = self._known.get(key)
+                is_improved = as_recorded is None or state.log_posterior > as_recorded.state.log_posterior
+                if state not in beam and is_improved:
                     beam.append(state)  # because neither explains tests that have a mistake and an effect
             if not beam:
                 break
@@ -170,7 +172,7 @@ class Search:
         return finding.verdict == "named" and finding.reported[0].best.refitted
 
     def _is_power_law(self) -> bool:
-        """True if a power law alone has a probability of 97 % or more and fits; more would fit its linearisation."""
+        """True if a power law alone has a probability of 97 % or more and fits the tests, so that the search ends."""
         finding = decide_verdict(self._ordered_hypotheses(), self.settings.tolerance)
         if finding.verdict == "consistent":
             return False
@@ -179,7 +181,7 @@ class Search:
         return is_power_law and finding.reported[0].probability >= NAMED and best.p_value >= DOES_NOT_FIT
 
     def _unrefitted_hypotheses(self) -> Iterator[Hypothesis]:
-        """Yield for a refit, one by one, the most probable hypotheses whose evidence is from the linear model."""
+        """Yield the most probable hypotheses whose evidence is from the linear model, one by one, to be refitted."""
         for _ in range(_LAST_REFITS):
             ordered = self._ordered_hypotheses()
             share = np.exp([hypothesis.log_posterior - ordered[0].log_posterior for hypothesis in ordered])
@@ -205,12 +207,6 @@ class Search:
         if (kind, name) not in self._log_priors:
             self._log_priors[kind, name] = min(odds for (other, _), odds in self._log_priors.items() if other == kind)
         return self._log_priors[kind, name]
-
-    def _is_improved(self, corrected: SearchState) -> bool:
-        """True if the same explanations are more probable with a recording mistake corrected than without."""
-        assert corrected.tests.mistake
-        uncorrected = self._known.get(corrected.key - {corrected.tests.mistake.key})
-        return uncorrected is None or corrected.log_posterior > uncorrected.state.log_posterior
 
     def _visit(self, state: SearchState) -> SearchState:
         """Record a state of the search (a fitted model) and its hypotheses, to visit it only once; return the state."""
@@ -241,8 +237,8 @@ class Search:
     def _select_effects(self, step: _Step, depth: int) -> list[Proposal]:
         """Select the effects to refit as additions to a state of the search.
 
-        The effects with the highest evidence in the linearised model, and those with the largest expected decrease of
-        chi-square, which is the better criterion for a large gap.
+        These are the effects with the highest evidence in the linearised model, and those with the largest expected
+        decrease of chi-square, which is the better criterion for a large gap.
 
         Args:
             step: state that the effects are added to, with the evidence for them.
@@ -286,11 +282,7 @@ class Search:
         return list(grown.values())
 
     def _with_faulty_parts(self, step: _Step) -> Iterator[SearchState]:
-        """Extend a state by each of its likeliest faulty parts of the tests, with errors of the most probable form.
-
-        Args:
-            step: state to extend, with the evidence for faulty parts.
-        """
+        """Extend a state by each of its likeliest faulty parts of the tests, with errors of the most probable form."""
         state = step.state
         # the faulty part itself may have distorted the parameters
         is_distorted = state.plain.reduced_chi_square > _DISTORTED

@@ -8,7 +8,7 @@ from dataclasses import replace
 from functools import partial
 
 from bushfit.caveat import Caveat
-from bushfit.diagnosis.closing import with_free_gains
+from bushfit.diagnosis.closing import without_assumed_gain_errors
 from bushfit.diagnosis.condense import shorten_tests
 from bushfit.diagnosis.faulty_parts import outlier_clusters
 from bushfit.diagnosis.fits import EVALUATIONS
@@ -83,7 +83,7 @@ def diagnose(
     search = Search(data, base, lambda mended: refit(mended)[0], settings, start, clusters)
     hypotheses = search.run()
     finding = decide_verdict(hypotheses, settings.tolerance)
-    diagnosis = DiagnosisWriter(search, finding, hypotheses, with_free_gains(base, data)).diagnosis()
+    diagnosis = DiagnosisWriter(search, finding, hypotheses, without_assumed_gain_errors(base, data)).diagnosis()
     pairs = zip(whole.sweeps, data.sweeps, strict=True)
     reduced = {after.name for before, after in pairs if after.size < before.size}
     counts = Counter(outlier.test for outlier in outliers if outlier.test in reduced)

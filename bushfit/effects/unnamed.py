@@ -140,16 +140,16 @@ class Unnamed:
         return replace(self, patches=(replace(patch, directions=(*patch.directions, str(place))),))
 
     def evaluate(self, setting: Setting, omega: Array, amplitude: Array) -> tuple[Array, Array, Array]:
-        """Evaluate the correction at operating points.
+        """Evaluate the smooth correction of the stiffness, relative to the uncorrected stiffness, at operating points.
 
         Args:
-            setting: test that the points belong to.
+            setting: direction and conditions of the test that the points belong to.
             omega: angular frequency [rad/s], (..., n).
             amplitude: zero-to-peak displacement [m or rad], (..., n).
 
         Returns:
-            Complex correction, (..., n); standard deviations of its two parts, (2, ..., n); and weight of the
-            correction, (..., n): 1 within the range of the nodes, 0 far outside.
+            Complex relative correction, (..., n); standard deviations of its real and imaginary part, (2, ..., n); and
+            weight of the correction, (..., n): 1 within the range of the nodes, 0 far outside.
         """
         strain = amplitude * geometry.unit_strain(setting.bushing, setting.direction)
         patch = next((patch for patch in self.patches if str(setting.direction) in patch.directions), None)

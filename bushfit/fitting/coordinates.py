@@ -63,8 +63,11 @@ class Coordinates:
         return np.array([values[name] if parameter.log else parameter.typical for name, parameter in pairs])
 
 
-def relative_sizes(model: Model, names: Sequence[str]) -> Array:
-    """Derivatives of k parameter coordinates with respect to dp/p, (k,): 1 for ln p, |p|/typical (>= 0.05) else."""
+def coordinate_per_relative_change(model: Model, names: Sequence[str]) -> Array:
+    """Derivatives of k parameter coordinates with respect to the relative change dp/p of each parameter p, (k,).
+
+    They are 1 for the coordinate ln p, and |p|/typical size, at least 0.05, for any other.
+    """
     pairs = [(model.parameters[name], abs(model.values[name])) for name in names]
     return np.array(
         [1.0 if parameter.log else max(value / parameter.typical, _LEAST_SIZE) for parameter, value in pairs]

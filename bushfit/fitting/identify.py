@@ -14,7 +14,7 @@ from bushfit.caveat import Caveat
 from bushfit.effects import effect_name_of
 from bushfit.effects.contract import Array
 from bushfit.fitting.assess import measured_range
-from bushfit.fitting.coordinates import Coordinates, relative_sizes
+from bushfit.fitting.coordinates import Coordinates, coordinate_per_relative_change
 from bushfit.fitting.preparation import MeasuredTest, split_by_kind
 from bushfit.fitting.problem import FitProblem
 from bushfit.model.covariance import Z95, Covariance
@@ -97,9 +97,11 @@ def undetermined_parameters(
     if not names:
         return []
     _, slopes = FitProblem(model, data_sets, names).linearise(model)
-    slopes = slopes[:, : sum(test.size for test in data_sets)] * relative_sizes(model, names)[:, None]
+    slopes = slopes[:, : sum(test.size for test in data_sets)] * coordinate_per_relative_change(model, names)[:, None]
     (rows, groups), lines = _open_groups(names, slopes), list[Caveat]()
-    changes = np.abs(Coordinates.of_parameters(model, names).slopes(model.values) * relative_sizes(model, names))
+    changes = np.abs(
+        Coordinates.of_parameters(model, names).slopes(model.values) * coordinate_per_relative_change(model, names)
+    )
     stderr = {name: covariance.stderr(name) or 0.0 for name in names}
     errors = {name: stderr[name] / float(change) for name, change in zip(names, changes, strict=True)}
     # neutral values of amounts of added effects, and the amounts that do not differ from them significantly

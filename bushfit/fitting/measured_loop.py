@@ -213,13 +213,7 @@ class MeasuredLoop(MeasuredBase):
         return self.whiten((response - self.measured_force) * self._per_noise)
 
     def residual_change(self, change: Array, model: Model, added: Array | float = 0.0) -> Array:
-        """Change of the whitened residuals, (..., size), due to a small change of the model's stiffness.
-
-        Args:
-            change: change of the stiffness in the first harmonic of the force, complex, (..., 1) [N/m or N m/rad].
-            model: not used for a loop.
-            added: not used for a loop.
-        """
+        """Change of the whitened residuals, (..., size), due to a change of the stiffness; see `MeasuredBase`."""
         return np.concatenate((change.real, change.imag), axis=-1) @ self._stiffness_changes
 
     @cached_property
@@ -279,7 +273,7 @@ class MeasuredLoop(MeasuredBase):
 
     def gain_and_offset(self) -> Array:
         """Change of the whitened residuals due to a gain error of 100 % and an offset of half the range, (2, size)."""
-        return self.shared_errors.whiten(np.array([self._unit_gain, self._unit_offset]))
+        return self.shared_errors.whiten(self._unit_gain_and_offset)
 
     @cached_property
     def _usable_rows(self) -> Array:
@@ -305,11 +299,7 @@ class MeasuredLoop(MeasuredBase):
         return self.whiten(waves * (self._per_noise * self.half_range))
 
     def whiten(self, difference: Array) -> Array:
-        """Whiten changes of the force at the rows, in units of noise, (..., n), so that noise has unit variance.
-
-        Returns:
-            Whitened residuals, (..., size), without correlation.
-        """
+        """Whiten changes of the force at the rows, in units of noise, (..., n); return residuals, (..., size)."""
         return self.shared_errors.whiten(self._whiten_rows(difference))
 
     @cached_property
@@ -319,21 +309,16 @@ class MeasuredLoop(MeasuredBase):
         return np.linalg.qr((waves * self._usable_rows).T)[0]
 
     @cached_property
-    def _unit_offset(self) -> Array:
-        """Change of the whitened rows if half the force range is added to the force of every row, (size,)."""
-        return self._whiten_rows(self._per_noise * self.half_range)
+    def _unit_gain_and_offset(self) -> Array:
+        """Changes of the whitened rows due to a gain error of 100 % and an offset of half the force range, (2, size).
 
-    @cached_property
-    def _unit_gain(self) -> Array:
-        """Change of the whitened rows due to a gain error of 100 %, (size,).
-
-        Notes: computed from the force without its noise. With noise, a fit would attribute noise to the gain, and bias
-        the model towards small forces (Peelle's puzzle: R. Fruehwirth, D. Neudecker, H. Leeb, EPJ Web of Conferences
-        27 (2012) 00008).
+        Notes: the gain error acts on the force without its noise. With noise, a fit would attribute noise to the gain,
+        and bias the model towards small forces (Peelle's puzzle: R. Fruehwirth, D. Neudecker, H. Leeb, EPJ Web of
+        Conferences 27 (2012) 00008).
         """
         waves, weighed = basis(self.phase, SMOOTH_HARMONICS), self.weights > 0.0
         smooth = waves @ np.linalg.lstsq(waves[weighed], self.measured_force[weighed], rcond=None)[0]
-        return self._whiten_rows(smooth * self._per_noise)
+        return self._whiten_rows(np.array([smooth, np.full_like(smooth, self.half_range)]) * self._per_noise)
 
     @cached_property
     def shared_errors(self) -> SharedErrors:
@@ -344,8 +329,7 @@ class MeasuredLoop(MeasuredBase):
         """
         if self.model_error:
             return self.model_errors
-        errors = [self._unit_offset, *([self._unit_gain] if self.gain_weighs else [])]
-        return SharedErrors.from_columns(self.gain_error * np.array(errors))
+        return SharedErrors.from_columns(self.gain_error * self._unit_gain_and_offset[::-1][: 1 + self.gain_weighs])
 
     @cached_property
     def unit_model_error(self) -> SharedErrors:
@@ -362,7 +346,7 @@ class MeasuredLoop(MeasuredBase):
             drift = np.cos(np.pi * order * phase / self.cycles) / (1.0 + order)
             waves = np.concatenate((waves, waves * (phase < 1.0), drift))
         rows = self._whiten_rows(waves * (self._per_noise * self.half_range))
-        return SharedErrors.from_columns(np.concatenate((rows, _ERROR_SIZES[:1, None] * self._unit_offset)))
+        return SharedErrors.from_columns(np.concatenate((rows, _ERROR_SIZES[:1, None] * self._unit_gain_and_offset[1])))
 
     @cached_property
     def model_errors(self) -> SharedErrors:
@@ -375,20 +359,13 @@ class MeasuredLoop(MeasuredBase):
             return errors
         waves = basis(self.phase, 1).T[1:] * (self._per_noise * self.half_range)
         first = errors.components(self.model_error * _ERROR_SIZES[0] * self._whiten_rows(waves))
-        gain = errors.components(self.gain_error * self._unit_gain)
+        gain = errors.components(self.gain_error * self._unit_gain_and_offset[0])
         covariance = np.diag(np.square(errors.deviations)) - first.T @ first + np.outer(gain, gain)
         variance, rotation = np.linalg.eigh(covariance)  # along the same directions, which are large
         return replace(errors, deviations=np.sqrt(np.maximum(variance, 0.0)), rotation=rotation)
 
     def noise_sensitivity(self, influence: Array) -> dict[Hashable, Array]:
-        """Change of the weights of the residuals in k estimates by one standard error of each noise variance.
-
-        Args:
-            influence: change of each estimate per unit of each whitened residual, (k, size).
-
-        Returns:
-            Changes of `influence`, (k, size), by identifier of the noise variance.
-        """
+        """Change of the weights of the residuals in k estimates by an error of the noise; see `MeasuredBase`."""
         reaction = self.shared_errors.whiten(influence)
         parts = self.row_noise.noise_sensitivity(reaction)
         if not parts and self.test.noise is None:

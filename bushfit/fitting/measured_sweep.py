@@ -198,16 +198,7 @@ class MeasuredSweep(MeasuredBase):
         return self.whiten(self.deviation(response))
 
     def residual_change(self, change: Array, model: Model, added: Array | float = 0.0) -> Array:
-        """Change of the whitened residuals due to a small change of the model's stiffness.
-
-        Args:
-            change: change of the model's stiffness, complex (..., n) [N/m or N m/rad].
-            model: model whose stiffness changes.
-            added: stiffness that is added to the model at the points, complex (n,) [N/m or N m/rad].
-
-        Returns:
-            Changes, (..., 2 n): of n gains, then of n phases.
-        """
+        """Change of the whitened residuals, (..., 2 n), due to a change of the stiffness; see `MeasuredBase`."""
         stiffness = self.response(model) + added
         relative = change / stiffness
         if self.residuals == "complex":
@@ -297,13 +288,7 @@ class MeasuredSweep(MeasuredBase):
             return self.level_errors.whiten(self.run_errors.whiten(rows))
 
     def noise_sensitivity(self, influence: Array) -> dict[Hashable, Array]:
-        """Change of the weights of the residuals in k estimates if a noise variance changes by its standard error.
-
-        Args:
-            influence: weights of the whitened residuals (gain and phase of n points) in the estimates, (k, 2 n).
-
-        Returns:
-            Changes of `influence`, (k, 2 n), by identifier of the noise variance; see `MeasuredLoop`.
+        """Change of the weights of the residuals in k estimates by an error of the noise; see `MeasuredBase`.
 
         Notes:
             Within a run the derivatives of V are I with respect to s^2 and 1 1^T with respect to t^2; whitened, W^2

@@ -1,6 +1,7 @@
 """Base class of measured loops and sweeps: one test with its noise."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Hashable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar, Self
@@ -84,6 +85,29 @@ class MeasuredBase(ABC):
             Residuals in the force of each row, (size,); of a sweep of n points, n gains, then n phases.
         """
         return self.residual_of(self.response(model))
+
+    @abstractmethod
+    def residual_change(self, change: Array, model: Model, added: Array | float = 0.0) -> Array:
+        """Change of the whitened residuals, (..., size), due to a small change of the model's stiffness.
+
+        Args:
+            change: change of the stiffness, complex: at each point of a sweep, (..., n), or in the first harmonic of a
+                loop's force, (..., 1) [N/m or N m/rad].
+            model: model whose stiffness changes; not used for a loop.
+            added: stiffness that is added to the model's at the points of a sweep, complex (n,) [N/m or N m/rad]; not
+                used for a loop.
+        """
+
+    @abstractmethod
+    def noise_sensitivity(self, influence: Array) -> dict[Hashable, Array]:
+        """Change of the weights of the residuals in k estimates if a noise variance changes by its standard error.
+
+        Args:
+            influence: change of each estimate per unit of each whitened residual, (k, size).
+
+        Returns:
+            Changes of `influence`, (k, size), by identifier of the noise variance.
+        """
 
     @property
     @abstractmethod

@@ -19,7 +19,7 @@ from bushfit.campaign.simulated import SimulatedLoop, SimulatedSweep
 from bushfit.diagnosis.propose import missing_effects, sensitivity
 from bushfit.effects import Effect
 from bushfit.effects.contract import UNKNOWN, Array, RubberConditions
-from bushfit.fitting.coordinates import Coordinates, relative_sizes
+from bushfit.fitting.coordinates import Coordinates, coordinate_per_relative_change
 from bushfit.fitting.preparation import MeasuredTest, planned_loop, planned_sweep, split_by_kind
 from bushfit.fitting.problem import FitProblem
 from bushfit.geometry import Place, shared_labels
@@ -253,7 +253,7 @@ def relative_slopes(knowledge: Knowledge, data_sets: Sequence[MeasuredTest]) -> 
     """
     model, bounded = knowledge.model, Coordinates.of_parameters(knowledge.model, knowledge.bounded)
     typical = np.array([parameter.typical for parameter in bounded.parameters]) / bounded.slopes(model.values)
-    sizes = np.concatenate((relative_sizes(model, knowledge.names), typical))
+    sizes = np.concatenate((coordinate_per_relative_change(model, knowledge.names), typical))
     problem = FitProblem(model, data_sets, (*knowledge.names, *knowledge.bounded))
     return problem.linearise(model)[1][:, : sum(test.size for test in data_sets)] * sizes[:, None]
 

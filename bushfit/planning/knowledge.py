@@ -17,7 +17,7 @@ from bushfit.diagnosis.workflow import diagnose
 from bushfit.effects import LIBRARY, get_effect, place_suffix, twins_of
 from bushfit.effects.unnamed import effect_label
 from bushfit.errors import ModelError, did_you_mean
-from bushfit.fitting.coordinates import Bounds, Coordinates, relative_sizes
+from bushfit.fitting.coordinates import Bounds, Coordinates, coordinate_per_relative_change
 from bushfit.fitting.preparation import MeasuredTest, split_by_kind
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.problem import FitResult
@@ -44,7 +44,9 @@ def from_result(result: Result, noise: Noise | None = None, source: str = "") ->
     names = tuple(name for name in fitted.names if fitted.stderr(name)) or tuple(model.parameters)
     covariance, origin = np.eye(len(names)) / 4.0, "given values, assumed to be known within a factor of 2.7"
     if fitted.names:
-        size = Coordinates.of_parameters(model, names).slopes(model.values) * relative_sizes(model, names)
+        size = Coordinates.of_parameters(model, names).slopes(model.values) * coordinate_per_relative_change(
+            model, names
+        )
         covariance, origin = fitted.restricted(names).matrix / np.outer(size, size), "a fitted model"
     return Knowledge(result, names, covariance, source or origin, noise or Noise())
 

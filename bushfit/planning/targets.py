@@ -98,10 +98,10 @@ class PlannedQuantity:
         return np.square(self.scale) * np.einsum("nk,kl,nl->n", self.rows, error_covariance, self.rows)
 
     def rms_error(self, error_covariance: Array) -> float:
-        """Root mean square over points of the reported standard errors, `value` times the relative errors.
+        """Root mean square, over the points of the quantity, of its standard error, in the unit of `value`.
 
         Args:
-            error_covariance: covariance of the parameters' relative errors, (k, k).
+            error_covariance: covariance of the relative errors of the k parameters after the planned tests, (k, k).
         """
         variances = self.variances(error_covariance) + self.model_error**2
         return float(np.sqrt(np.mean(np.square(self.value) * variances)))

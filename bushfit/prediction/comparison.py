@@ -125,11 +125,13 @@ class Comparison:
         return bool(len(band.root)) & (_distance_from_zero(band) > self.widening)
 
     @property
-    def differing(self) -> list[str]:
-        """Names of stiffnesses, loss factors and parameters that differ significantly (false alarms: at most 5 %).
+    def significant_differences(self) -> list[str]:
+        """Names of the stiffnesses, loss factors and parameters that differ between the two results beyond chance.
 
-        Notes: Hochberg's procedure (Biometrika 75 (1988) 800) for two tests, of all points and of all parameters: a
-        test is significant if both are at 5 %, or if it is at 2.5 %.
+        The probability of any name if the results are equal is at most 5 %.
+
+        Notes: Hochberg's procedure (Biometrika 75 (1988) 800) for two hypothesis tests, one of stiffness and loss
+        factor at all points, one of all parameters: both are significant if both are at 5 %, or either at 2.5 %.
         """
         stiffness, joint = 1.0, self.joint.p if self.joint else 1.0
         if distances := [_distance_from_zero(band).max() for band in self.bands.values() if len(band.root)]:

@@ -250,11 +250,11 @@ def _clean_resonance(truth: Model, test: SimulatedResonance, steps_per_cycle: in
     mount, frequency = truth.without(Level.INSTRUMENT), np.array(test.frequencies)
     base = test.base_acceleration / (2.0 * np.pi * frequency) ** 2
 
-    def closed(amplitude: Array) -> Array:
-        """Complex stiffness by the equation in frequency, at zero-to-peak amplitudes of the mount's deformation [m]."""
+    def closed_form_stiffness(amplitude: Array) -> Array:
+        """Complex stiffness [N/m] by the model's closed form, at zero-to-peak deformations of the mount [m], (n,)."""
         return mount.stiffness(test.direction, frequency, amplitude)
 
-    approximate, _ = shaken_response(closed, test.mass, frequency, base)
+    approximate, _ = shaken_response(closed_form_stiffness, test.mass, frequency, base)
     stiffness = rig.dynamic_stiffness(mount, test.direction, frequency, approximate, steps_per_cycle=steps_per_cycle)
-    ratio: Array = stiffness / closed(approximate)
-    return shaken_response(lambda amplitude: ratio * closed(amplitude), test.mass, frequency, base)[1]
+    ratio: Array = stiffness / closed_form_stiffness(approximate)
+    return shaken_response(lambda amplitude: ratio * closed_form_stiffness(amplitude), test.mass, frequency, base)[1]

@@ -75,7 +75,7 @@ def test_equal_bushings_differ_no_oftener_than_said(fits):
         "a parameter, Holm": sum(any(row.holm is not None and row.holm < 0.05 for row in f.parameters) for f in found),
         "all together": sum(f.joint is not None and f.joint.p < 0.05 for f in found),
         "words": sum(any("higher" in line or "lower" in line for line in f.sentences()) for f in found),
-        "headline": sum(bool(f.differing) for f in found),
+        "headline": sum(bool(f.significant_differences) for f in found),
     }
     assert max(alarms.values()) <= binom.isf(3e-3, len(fits), 0.05)  # more in 3 of a thousand
 
@@ -124,9 +124,12 @@ def test_the_headline_joins_two_tests(paper_model, deviation, joint, named):
         Band(np.array([x]), np.array([x - half[0]]), np.array([x + half[1]]), np.ones((1, 1))) for x in (deviation, 0.0)
     ]
     contrast = replace(found.contrasts[0], stiffness=bands[0], loss_factor=bands[1])
-    assert replace(found, contrasts=(contrast,), joint=JointContrast(joint, 5)).differing == named
+    assert replace(found, contrasts=(contrast,), joint=JointContrast(joint, 5)).significant_differences == named
     unknown = replace(contrast, stiffness=replace(bands[0], root=np.empty((0, 1))), loss_factor=bands[1])
-    assert replace(found, contrasts=(replace(unknown, loss_factor=unknown.stiffness),), joint=None).differing == []
+    assert (
+        replace(found, contrasts=(replace(unknown, loss_factor=unknown.stiffness),), joint=None).significant_differences
+        == []
+    )
 
 
 @pytest.mark.parametrize("freedom", [1e6, 12.0])
