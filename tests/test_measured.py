@@ -22,8 +22,8 @@ from bushfit.reading.headers import RESONANCE_COLUMNS
 from bushfit.reading.measurement import loss_factor
 from bushfit.reading.resonance import read_resonance
 from bushfit.reduction.resonance import reduce_resonance
+from bushfit.simulation.exact import simulate_exact
 from bushfit.simulation.measured import measure
-from bushfit.simulation.undisturbed import undisturbed
 
 #: Draws of noise; simulated data.
 SEEDS = 20
@@ -72,7 +72,7 @@ def test_the_smallest_axial_sweep_and_a_loop_tell_the_radial_stiffness(root, off
 @pytest.mark.slow
 def test_so_they_do_whatever_the_noise(root, off, claimed):
     plan = SimulateSettings(noise=5e-3, force_noise=3e-3, repeats=3)
-    clean = undisturbed(model_of(load_campaign(root / "configs/table_1.toml")), plan)
+    clean = simulate_exact(model_of(load_campaign(root / "configs/table_1.toml")), plan)
     drawn = [100.0 * off(measure(clean, replace(plan, seed=seed)).campaign())[0] for seed in range(SEEDS)]
     print(f"{SEEDS} draws: radial stiffness, median {np.median(drawn):.2f} %, worst {max(drawn):.2f} %")
     assert [f"{np.median(drawn):.1f}", f"{max(drawn):.1f}"] == [claimed[2], claimed[3]]

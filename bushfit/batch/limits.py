@@ -74,7 +74,7 @@ class Bounds:
             raise ValueError(CampaignError("no value meets these limits", expected="min below max"))
 
     @property
-    def fixed(self) -> tuple[float, float]:
+    def fixed_limits(self) -> tuple[float, float]:
         """Lowest and highest allowed value by min, max, nominal and tolerance; infinite on a side without a limit."""
         low, high = -math.inf if self.min is None else self.min, math.inf if self.max is None else self.max
         if self.nominal is not None and self.tolerance is not None:
@@ -207,7 +207,7 @@ def resolve_limits(limits: Limits, values: Mapping[str, Array]) -> tuple[dict[st
     """
     allowed, notes = dict[str, tuple[float, float]](), list[Caveat]()
     for name, bounds in limits.bounds.items():
-        allowed[name] = bounds.fixed
+        allowed[name] = bounds.fixed_limits
         if bounds.sigma is None:
             continue
         sample = values.get(name, np.empty(0))
@@ -220,7 +220,7 @@ def resolve_limits(limits: Limits, values: Mapping[str, Array]) -> tuple[dict[st
             sentence = "more than half of the parts have exactly the same value: sigma is not judged"
             notes.append(Caveat("sigma_not_judged", sentence).about(name))
         else:
-            (low, high), reach = bounds.fixed, bounds.sigma * deviation
+            (low, high), reach = bounds.fixed_limits, bounds.sigma * deviation
             allowed[name] = max(low, median - reach), min(high, median + reach)
     return allowed, notes
 

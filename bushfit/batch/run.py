@@ -20,7 +20,7 @@ from bushfit.errors import OutputError
 from bushfit.progress import track
 from bushfit.report import plots
 from bushfit.report.batch_document import BatchFile
-from bushfit.report.results import Picture, ResultFile, check_free, encode_all, unwritable, write_files
+from bushfit.report.results import Picture, ResultFile, check_free, encode_all, unwritable_error, write_files
 from bushfit.validation import to_json_data
 
 #: Names of all possible files of the whole batch.
@@ -102,7 +102,7 @@ def run_batch(plan: BatchPlan, workers: Workers, before_writing: Callable[[Batch
             write_files(output, encoded)
             return result
     except OSError as error:
-        raise unwritable(output, error) from error
+        raise unwritable_error(output, error) from error
 
 
 def remove_unlisted_parts(plan: BatchPlan) -> list[Caveat]:

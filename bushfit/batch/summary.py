@@ -209,7 +209,7 @@ class BatchResult:
             detectable = limit and limit * float(values[usual].std(ddof=1))
         bounds = self.plan.limits.bounds.get(name) if self.plan.limits and name not in FIT_NAMES else None
         low, high = self.allowed.get(name, (-np.inf, np.inf))
-        fixed = bounds.fixed if bounds else (-np.inf, np.inf)
+        fixed = bounds.fixed_limits if bounds else (-np.inf, np.inf)
         median, sigma = median_and_scatter(known_values)
         cp, cpk = capability(known_values, *(end * column.factor for end in fixed))
         minimum, maximum = (end * column.factor if np.isfinite(end) else None for end in (low, high))

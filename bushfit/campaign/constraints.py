@@ -108,7 +108,7 @@ def _prior_from_result(
     if not names:
         found = f"{only} is not fitted in {file}" if only else f"no fitted parameter in {file}"
         raise CampaignError("the earlier model has no such parameter", found=found, expected="a fitted parameter")
-    covariance = result.covariance.restricted(names)
+    covariance = result.covariance.select(names)
     mean = np.array([result.model.values[name] for name in covariance.names])
     return Prior(covariance.names, mean, covariance.matrix, file)
 

@@ -78,7 +78,7 @@ def planned_session(bushing: Bushing | None, tests: Sequence[SimulatedTest], rep
         else:
             assert isinstance(test, SimulatedResonance)
             amplitudes = np.zeros(repeats * len(test.frequencies))
-        session_tests.append(SessionTest(test.direction, amplitudes, test.temperature, preload=test.static))
+        session_tests.append(SessionTest(test.direction, amplitudes, test.temperature, preload=test.parsed_preload))
     return session(bushing, session_tests)
 
 

@@ -52,7 +52,7 @@ class SimulatedTest:
     preload: Text | None = field(default=None, kw_only=True)
 
     @property
-    def static(self) -> Preload | None:
+    def parsed_preload(self) -> Preload | None:
         """Static displacement or force about which the test is made, parsed from `preload`; None if not stated."""
         return parse_preload(self.preload, self.direction)
 

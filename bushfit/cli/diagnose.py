@@ -117,7 +117,7 @@ def print_verdict(output: Output, diagnosed: DiagnosisOutput, again: str, action
     output.print_headline(diagnosed.data.campaign.name, diagnosed.headline, action or use, f"bold {colour}")
     lines = [use] if action and colour != "green" else []
     lines += [*diagnosed.diagnosis.summary.split("; "), *format_odds(diagnosed.document)]
-    if labels := diagnosed.adoptable:
+    if labels := diagnosed.adoptable_names:
         exclude = {"exclude": "--without"} if diagnosed.diagnosis.verdict == "ambiguous" else {}
         source = "the records" if any(effect["correction"] for effect in diagnosed.document["effects"]) else "tests"
         for answer, option in {"confirm": "--adopt", **exclude}.items():
@@ -152,7 +152,7 @@ def print_findings(output: Output, diagnosed: DiagnosisOutput) -> None:
         if regions and not (title == "what remains" and diagnosis.remainder == diagnosis.where):
             console.print(f"  [bold]{title}[/bold]")
             for region in regions:
-                console.print(f"    {number(region.excess, 2):>5} σ: {escape(region.reading)}")
+                console.print(f"    {number(region.excess, 2):>5} σ: {escape(region.sentence)}")
     if diagnosis.next_test:
         console.print(f"  [bold]next test:[/bold] {escape(diagnosis.next_test)}")
     if diagnosed.rivals:

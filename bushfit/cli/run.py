@@ -42,11 +42,11 @@ def command(campaigns: tuple[Path, ...], loss: Loss | None, max_nrmse: float | N
     outcome = run(campaign, loss=loss)
     output.warn(outcome.data.notes)
     diagnosis, action = outcome.diagnosed and outcome.diagnosed.diagnosis, f"use {folder / 'model.json'}, "
-    if diagnosis and diagnosis.added:
+    if diagnosis and diagnosis.has_added_effects:
         effects, before = diagnosis.result.model.effects, diagnosis.before.model.effects
         added = [effect_label(name) for name in effects if name not in before]
         action += f"with {join_names(added)}; joint.json is the fit without {'it' if len(added) == 1 else 'them'}"
-    elif diagnosis and (diagnosis.changed or diagnosis.verdict == "unexplained"):
+    elif diagnosis and (diagnosis.is_changed or diagnosis.verdict == "unexplained"):
         action = ""  # no model to use before the record is corrected, or the cause is known
     else:
         action += "the joint fit"
@@ -72,7 +72,8 @@ def print_run(output: Output, name: str, outcome: RunOutput, action: str, again:
     else:
         output.print_headline(name, "every parameter is fixed, so there is nothing to diagnose", action)
     tests = f"the {join_names(result.measured.directions)} tests" if result.measured else "these tests"
-    print_result(output, f"{name}: {'model to use, fitted to' if outcome.added else 'joint fit of'} {tests}", result)
+    fit = "model to use, fitted to" if outcome.has_added_effects else "joint fit of"
+    print_result(output, f"{name}: {fit} {tests}", result)
     if diagnosed and (output.verbose or diagnosed.diagnosis.verdict != "consistent"):
         print_findings(output, diagnosed)
     _print_range(output, outcome)
@@ -85,7 +86,7 @@ def print_run(output: Output, name: str, outcome: RunOutput, action: str, again:
             print_step(output, f"{name}: {title}", step, "static.json")
         if two_step:
             print_step(output, f"{name}: static and dynamic fit in turn", two_step.result, "dynamic.json")
-        if outcome.added:
+        if outcome.has_added_effects:
             print_step(output, f"{name}: joint fit", joint, "joint.json")
     left_out, shown = f"skipped ({outcome.reason_left_out})", "static.json and dynamic.json; -v shows the parameters"
     output.print(f"two-step procedure of the paper: {shown if two_step else left_out}")

@@ -56,7 +56,7 @@ class DiagnosisOutput:
         return "; ".join(filter(None, (self.diagnosis.verdict, unknown)))
 
     @property
-    def adoptable(self) -> list[str]:
+    def adoptable_names(self) -> list[str]:
         """Effects and mistakes to adopt if tests confirm them; empty if it is useless to adopt them.
 
         It is useless if the named effects are certain and in the model already, or if a part of the tests has to be
@@ -119,16 +119,16 @@ def diagnose(
     changed = {key: f"{number:g}" for key, number in numbers.items() if number != getattr(DiagnosisSettings, key)}
     options = option_words(model="MODEL.json" if start else None, adopt=adopt, without=without, **changed)
     diagnosis = workflow.diagnose(data, start.model if start else None, settings)
-    if not (diagnosis.changed or start or adopt):  # the model to use is that of fit
+    if not (diagnosis.is_changed or start or adopt):  # the model to use is that of fit
         plain = (joint or fit(data)).result
         warnings = (replace(warning, text=warning.text.removesuffix(NEXT)) for warning in plain.warnings)
         plain = replace(plain, warnings=tuple(warnings))
-        diagnosis = replace(diagnosis, result=diagnosis.odds.averaged(plain))
+        diagnosis = replace(diagnosis, result=diagnosis.odds.widen(plain))
     document = diagnosis.to_document()
     origin = campaign_document(data, "diagnose", options)
     records = data.campaign.validation
     validations = validate(diagnosis.result, records)
-    if records and diagnosis.added:
+    if records and diagnosis.has_added_effects:
         pairs = zip(validations, validate((joint or fit(data)).result, records), strict=True)
         validations = [replace(validation, nrmse_before=plain.entry["nrmse"]) for validation, plain in pairs]
     if validations:

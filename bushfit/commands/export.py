@@ -12,7 +12,7 @@ from typing_extensions import TypedDict
 from bushfit.campaign.campaign import Campaign
 from bushfit.caveat import WarningEntries, to_entries
 from bushfit.commands.predict import predict
-from bushfit.export.contract import Exported, ExportRequest
+from bushfit.export.contract import ExportedFiles, ExportRequest
 from bushfit.model.result import Result
 from bushfit.prediction.grid import GridOptions
 from bushfit.progress import track
@@ -85,9 +85,9 @@ def export(
         predicted = predict(result, campaign, temperature=temperature, **grid)
     today = datetime.now(UTC).date().isoformat()
     request = ExportRequest(result, source, tuple(predicted.predictions), day=today, **settings)
-    exported, formats = list[Exported](), dict[str, FormatEntry]()
+    exported, formats = list[ExportedFiles](), dict[str, FormatEntry]()
     for name in track("formats written", names):
-        written: Exported = resolve_name(f"bushfit.{FORMATS[name]}")(request)
+        written: ExportedFiles = resolve_name(f"bushfit.{FORMATS[name]}")(request)
         exported.append(written)
         limits = to_entries(written.omissions)
         left_out, kinds = limits["warnings"], limits["warning_kinds"]

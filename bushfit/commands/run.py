@@ -83,9 +83,9 @@ class RunOutput:
         return self.predicted.result
 
     @property
-    def added(self) -> bool:
+    def has_added_effects(self) -> bool:
         """True if the diagnosis added an effect to the model to use."""
-        return bool(self.diagnosed and self.diagnosed.diagnosis.added)
+        return bool(self.diagnosed and self.diagnosed.diagnosis.has_added_effects)
 
 
 def run(campaign: Campaign | PreparedCampaign, *, loss: Loss | None = None) -> RunOutput:
@@ -114,7 +114,7 @@ def run(campaign: Campaign | PreparedCampaign, *, loss: Loss | None = None) -> R
     diagnosed = diagnose(data, joint=joint) if joint.result.fitted else None
     notes = diagnosed.diagnosis.notes if diagnosed else ()
     predicted = predict((diagnosed or joint).result, data.campaign, notes=notes)
-    added = bool(diagnosed and diagnosed.diagnosis.added)
+    added = bool(diagnosed and diagnosed.diagnosis.has_added_effects)
     results = {
         "static": static and static.result,
         "dynamic": two_step and two_step.result,

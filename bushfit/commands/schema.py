@@ -22,7 +22,7 @@ from bushfit.validation import inline_fields
 
 
 @dataclass(frozen=True)
-class Described:
+class FileDescription:
     """Kind of file that has a JSON Schema: its names, its type in bushfit, and how the schema treats missing keys.
 
     Args:
@@ -39,7 +39,7 @@ class Described:
 
 #: Every schema by its name, as schemas.toml lists them.
 DESCRIBED = {
-    name: Described(**row)
+    name: FileDescription(**row)
     for name, row in tomllib.loads(Path(__file__).with_name("schemas.toml").read_text(encoding="utf-8")).items()
 }
 #: Keywords of pydantic for a text that becomes a number; they are not part of JSON Schema.

@@ -18,7 +18,7 @@ from bushfit.diagnosis.priors import LARGEST_REMAINING_SHARE
 from bushfit.diagnosis.search import Search
 from bushfit.diagnosis.verdict import Finding
 from bushfit.effects.contract import Array
-from bushfit.effects.unnamed import NAME, Unnamed
+from bushfit.effects.unnamed import NAME, SmoothCorrection
 from bushfit.errors import FitError
 from bushfit.fitting.agreement import LeaveOut
 from bushfit.fitting.coordinates import Bounds
@@ -102,14 +102,14 @@ def describe_gap(
     sentence = f"up to {largest} ± {error} % of |K| with refitted parameters"
     if not has_candidates:
         try:
-            problem = FitProblem.with_fixed(fit.model, harmonic, fit.fixed, bounds)
+            problem = FitProblem.with_fixed(fit.model, harmonic, fit.fixed_names, bounds)
             base = Descent.start(problem).run(_EVALUATIONS).solution
-            problem = FitProblem.with_fixed(base.model, harmonic, (*fit.fixed, *base.at_bound), bounds)
+            problem = FitProblem.with_fixed(base.model, harmonic, (*fit.fixed_names, *base.at_bound), bounds)
             base = Descent.start(problem).run(_EVALUATIONS).solution
         except FitError:  # too few points are left for the parameters
             return None
         law = nearest_power_law(base, rig, start, bounds)
-        if law and law.is_likely and any(law.determined):
+        if law and law.is_likely and any(law.are_determined):
             description = Description(law.phase_deg, law.frequency_power, law.amplitude_power, law.sentence)
             sentence += f"; {law.sentence}"
     model = replace(fitted.model, effects=(*fit.model.effects, NAME), unnamed=correction)
@@ -119,7 +119,7 @@ def describe_gap(
     return GapDescription(after, fitted, holdout, description, sentence, _validity_sentence(correction, whole))
 
 
-def _hold_out_inside(before: FitResult, closest: FitResult, correction: Unnamed) -> HoldOut:
+def _hold_out_inside(before: FitResult, closest: FitResult, correction: SmoothCorrection) -> HoldOut:
     """Predict parts of the sweeps inside the tested range from the other parts, without and with the correction.
 
     Args:
@@ -166,7 +166,7 @@ def _hold_out_inside(before: FitResult, closest: FitResult, correction: Unnamed)
     return HoldOut.from_residuals(residuals)
 
 
-def _validity_sentence(correction: Unnamed, whole: FitResult) -> str:
+def _validity_sentence(correction: SmoothCorrection, whole: FitResult) -> str:
     """Sentence with the range of frequency and amplitude of the correction, and the misfit of the worst loop."""
 
     def span(values: Sequence[float], factor: float = 1.0) -> str:
@@ -183,7 +183,7 @@ def _validity_sentence(correction: Unnamed, whole: FitResult) -> str:
 
 
 @dataclass(frozen=True, eq=False)
-class Closing:
+class ClosedGap:
     """Fits that reduce the misfit of a diagnosed campaign: with the effects found, then with a smooth correction.
 
     Args:
@@ -204,7 +204,7 @@ class Closing:
         return self.gap.after if self.gap else self.effects_fit
 
 
-def close_gap(search: Search, finding: Finding, hypotheses: Sequence[Hypothesis], base: FitResult) -> Closing:
+def close_gap(search: Search, finding: Finding, hypotheses: Sequence[Hypothesis], base: FitResult) -> ClosedGap:
     """Fit the effects with a probability of 97 % or more, and correct the stiffness for the rest of the misfit.
 
     The correction is a smooth function of frequency and strain. It is left out if the effects explain the misfit, or if
@@ -222,7 +222,7 @@ def close_gap(search: Search, finding: Finding, hypotheses: Sequence[Hypothesis]
     """
     verdict, reported, data = finding.verdict, finding.reported, search.data
     may_be_wrong = {
-        "partly": reported[0].best.levels,
+        "partly": reported[0].best.has_level_errors,
         "ambiguous": any(composition.faulty_parts or composition.best.mistake for composition in reported),
     }
     certain, amounts = _fit_certain(search, finding, hypotheses)
@@ -231,7 +231,7 @@ def close_gap(search: Search, finding: Finding, hypotheses: Sequence[Hypothesis]
         rig, has_candidates = data.campaign.rig, verdict == "ambiguous"
         gap = describe_gap(fit, rig, search.start, data.bounds, before=base, has_candidates=has_candidates)
     is_compared = verdict == "named" or (verdict == "ambiguous" and finding.names and not gap)
-    return Closing(fit, amounts, gap, hold_out(base, fit, data.bounds) if is_compared else None)
+    return ClosedGap(fit, amounts, gap, hold_out(base, fit, data.bounds) if is_compared else None)
 
 
 def _fit_certain(
@@ -246,18 +246,18 @@ def _fit_certain(
         The fit, and the covariance of the amounts that were fixed; None if all were fitted.
     """
     base, bounds, names = search.base, search.data.bounds, finding.names
-    refitted = [h for h in hypotheses if h.refitted and not h.mistake and set(h.effects) >= set(names)]
+    refitted = [h for h in hypotheses if h.is_refitted and not h.mistake and set(h.effects) >= set(names)]
     if not names or not refitted:
         return base, None
     if not finding.reported[0].unnamed:
         state = min((h.state for h in refitted), key=lambda state: len(state.effects) > len(names))
         model = state.fit.model.without(*{*state.effects} - {*names})
-        return fit_model(model, base.data_sets, base.fixed, bounds), None
+        return fit_model(model, base.data_sets, base.fixed_names, bounds), None
     model = base.model
     for name in names:
         model = model.with_effect(name)
     added, covariance = mean_parameters(refitted, [name for name in model.values if name not in base.model.values])
-    return fit_model(model.with_values(added), base.data_sets, [*base.fixed, *added], bounds), covariance
+    return fit_model(model.with_values(added), base.data_sets, [*base.fixed_names, *added], bounds), covariance
 
 
 def without_assumed_gain_errors(fit: FitResult, data: PreparedCampaign) -> FitResult:
@@ -265,4 +265,4 @@ def without_assumed_gain_errors(fit: FitResult, data: PreparedCampaign) -> FitRe
     gain_is_stated = data.campaign.rig.stiffness_errors[0] is not None
     if gain_is_stated or not any(loop.gain_weighs for loop in split_by_kind(fit.data_sets)[0]):
         return fit
-    return fit_model(fit.model, with_gain_weighting(fit.data_sets, weigh=False), fit.fixed, data.bounds)
+    return fit_model(fit.model, with_gain_weighting(fit.data_sets, weigh=False), fit.fixed_names, data.bounds)

@@ -87,7 +87,7 @@ def explanation_odds(finding: Finding) -> Odds:
         parts += [f"a faulty test: {part.name}" for part in composition.faulty_parts]
         sentences.append(" + ".join((*parts, *composition.nameless)))
         is_rival = finding.verdict == "ambiguous" or composition is not finding.reported[0]
-        fit = composition.best.state.plain if is_rival and composition.best.refitted else None
+        fit = composition.best.state.plain if is_rival and composition.best.is_refitted else None
         fits.append((fit.model, misfit_covariance(fit)) if fit else None)
     pairs = tuple(zip(sentences, (composition.probability for composition in compositions), strict=True))
     labels = tuple(composition.labels for composition in compositions)

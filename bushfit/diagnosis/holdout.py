@@ -67,7 +67,7 @@ class HoldOutPart:
             [np.tile(mask, data.residuals_per_point) for data, mask in zip(data_sets, self.points, strict=True)]
         )
 
-    def rest(self, data_sets: Sequence[MeasuredTest]) -> list[MeasuredTest]:
+    def remaining_tests(self, data_sets: Sequence[MeasuredTest]) -> list[MeasuredTest]:
         """Tests without the held-out points, with unchanged noise; tests held out entirely are omitted."""
         remaining = [(data, mask) for data, mask in zip(data_sets, self.points, strict=True) if not mask.all()]
         return [data.without(np.flatnonzero(mask)).with_weight() if mask.any() else data for data, mask in remaining]
@@ -218,7 +218,7 @@ def _predict(fit: FitResult, leave_out: LeaveOut, part: HoldOutPart, bounds: Bou
     if not is_step:
         failed = Skipped(part.name, "no fit to the other tests converges")
         try:
-            rest = fit_model(fit.model, part.rest(data_sets), fit.fixed, bounds)
+            rest = fit_model(fit.model, part.remaining_tests(data_sets), fit.fixed_names, bounds)
         except (FitError, ModelError):
             return failed
         rest = rest.reevaluate(rest.model, data_sets)

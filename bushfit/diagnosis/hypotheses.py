@@ -42,7 +42,8 @@ class Hypothesis:
             fitted.
         last_change: relative change of |K| due to the last explanation or the compound's deviation; 0 without either.
         compound_deviates: True if the hypothesis includes a smooth deviation of the rubber from the model's laws.
-        levels: True if the hypothesis includes rig errors of whole levels larger than the rig's accuracy class allows.
+        has_level_errors: True if the hypothesis includes rig errors of whole levels (constant amplitudes or
+            frequencies) that are larger than the rig's accuracy class allows.
         clusters: disturbances at frequencies with several outliers that were left out.
     """
 
@@ -52,13 +53,13 @@ class Hypothesis:
     last: Explanation | None = None
     last_change: float = 0.0
     compound_deviates: bool = False
-    levels: bool = False
+    has_level_errors: bool = False
     clusters: tuple[OutlierCluster, ...] = ()
 
     @property
     def effects(self) -> tuple[str, ...]:
         """Names of the effects that the hypothesis adds to the model, in the order of the search."""
-        return (*self.state.effects, *([] if self.refitted or not self.last else [self.last.name]))
+        return (*self.state.effects, *([] if self.is_refitted or not self.last else [self.last.name]))
 
     @property
     def faulty_parts(self) -> tuple[FaultyPart, ...]:
@@ -80,11 +81,11 @@ class Hypothesis:
     @cached_property
     def key(self) -> frozenset[Hashable]:
         """Names that identify this set of explanations; empty for the hypothesis that nothing is missing."""
-        marks = [self.unnamed, "levels" if self.levels else "", self.mistake and self.mistake.key]
+        marks = [self.unnamed, "levels" if self.has_level_errors else "", self.mistake and self.mistake.key]
         return frozenset((*self.effects, *(part.name for part in self.faulty_parts), *filter(None, marks)))
 
     @property
-    def refitted(self) -> bool:
+    def is_refitted(self) -> bool:
         """True if all effects of the hypothesis were refitted; False if one was weighed in the linear model alone."""
         return self.last is None or self.last.kind != "effect"
 
@@ -264,7 +265,7 @@ class SearchState:
         steps = dict(zip(names, slopes * mean[:count], strict=True))
         means = {name: float(np.clip(values[name] + x, *get_parameter(name).bounds)) for name, x in steps.items()}
         fitted = Covariance(names, covariance[:count, :count] * np.outer(slopes, slopes))
-        return means, fitted.restricted([name for name in names if name not in fit.at_bound])
+        return means, fitted.select([name for name in names if name not in fit.at_bound])
 
     def weigh(self, sets: Sequence[SignatureSet]) -> list[Evidence]:
         """Evidence of the tests for further explanations, averaged over the likely sizes of the rig's errors.
@@ -282,7 +283,7 @@ class SearchState:
         """Indices of the c noise cases (sizes of the errors of rig and rubber) with a high evidence, (c,)."""
         return self.linear.likely_cases(self.columns.curves, _NEAR)
 
-    def extended(self, evidence: Evidence, last: Explanation | None = None, log_odds: float = 0.0) -> list[Hypothesis]:
+    def extend(self, evidence: Evidence, last: Explanation | None = None, log_odds: float = 0.0) -> list[Hypothesis]:
         """List the hypotheses with the explanations of this search state and at most one further explanation.
 
         Args:
@@ -313,7 +314,7 @@ class SearchState:
         """
         log_posterior = self.log_weight + self.linear.log_evidence_with_level_errors
         change = max(self.change, LEVELS[-1][0] * max(class_errors(self.tests.rig, ASSUMED)))
-        return [*self.extended(self.linear.evidence), Hypothesis(self, log_posterior, change, levels=True)]
+        return [*self.extend(self.linear.evidence), Hypothesis(self, log_posterior, change, has_level_errors=True)]
 
 
 def mean_parameters(hypotheses: Sequence[Hypothesis], names: Sequence[str]) -> tuple[dict[str, float], Covariance]:
@@ -336,8 +337,8 @@ def mean_parameters(hypotheses: Sequence[Hypothesis], names: Sequence[str]) -> t
     mean = np.clip(weights @ means, means.min(axis=0), means.max(axis=0))  # rounding may leave their range
     matrix = np.einsum("n,ni,nj->ij", weights, means - mean, means - mean)
     for weight, (_, covariance) in zip(weights, pairs, strict=True):
-        restricted = covariance.restricted(names)
+        restricted = covariance.select(names)
         indices = [names.index(name) for name in restricted.names]
         matrix[np.ix_(indices, indices)] += weight * restricted.matrix
     determined = [name for _, covariance in pairs for name in covariance.names]
-    return dict(zip(names, mean.tolist(), strict=True)), Covariance(tuple(names), matrix).restricted(determined)
+    return dict(zip(names, mean.tolist(), strict=True)), Covariance(tuple(names), matrix).select(determined)

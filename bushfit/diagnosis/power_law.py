@@ -103,7 +103,7 @@ class PowerLaw:
     of_one_place: bool = False
 
     @property
-    def determined(self) -> list[bool]:
+    def are_determined(self) -> list[bool]:
         """Three flags: True if the tests determine the phase, the power of frequency and the power of amplitude."""
         widths = (_PHASE_WIDTH, _POWER_WIDTH, _POWER_WIDTH)
         intervals = (self.phase_deg, self.frequency_power, self.amplitude_power)
@@ -119,9 +119,9 @@ class PowerLaw:
         near = next((text for quarter, text in _PHASES.items() if low <= quarter <= high), "")
         turned = np.exp(1j * np.radians(phase))
         stiffness, loss = ("adds" if part > 0.0 else "lowers" for part in (turned.real, turned.imag))
-        parts = [near or f"{stiffness} stiffness and {loss} loss"] * self.determined[0]
+        parts = [near or f"{stiffness} stiffness and {loss} loss"] * self.are_determined[0]
         powers = ((self.frequency_power, "frequency"), (self.amplitude_power, "amplitude"))
-        for determined, ((value, low, high), axis) in zip(self.determined[1:], powers, strict=True):
+        for determined, ((value, low, high), axis) in zip(self.are_determined[1:], powers, strict=True):
             if determined and low <= 0.0 <= high:
                 parts.append(f"independent of {axis}")
             elif determined:
@@ -129,7 +129,7 @@ class PowerLaw:
         quantities = (self.quantity, *self.alternatives)
         if not self.of_one_place and len(quantities) < len(_QUANTITIES):
             parts.append(" or ".join(_QUANTITIES[quantity] for quantity in quantities))
-        like = self._known_law() if all(self.determined) else ""
+        like = self._known_law() if all(self.are_determined) else ""
         form = ", ".join(parts) or "has a form that these tests do not determine"
         return f"the correction acts like {like}: {form}" if like else f"the correction {form}"
 
@@ -190,7 +190,7 @@ class Term:
         per_unit = model.stiffness_per_modulus if self.quantity == "modulus" else lambda _: 1.0
         return np.concatenate([np.full(test.frequency.size, per_unit(test.direction)) for test, _ in self.tests])
 
-    def scaled(self, shapes: Array, model: Model) -> Array:
+    def scale_shapes(self, shapes: Array, model: Model) -> Array:
         """Scale c shapes of the added stiffness, (c, p), so that each changes the model's |K| by at most 100 %."""
         return shapes / np.abs(shapes * self.unit(model) / self.stiffness(model)).max(axis=-1)[:, None]
 
@@ -205,7 +205,7 @@ class Term:
                 residuals[rows] += test.residual_change(added[points], model)
         return residuals
 
-    def linearised(self, model: Model, value: Array, shapes: Array) -> tuple[Array, Array, Array]:
+    def linearise(self, model: Model, value: Array, shapes: Array) -> tuple[Array, Array, Array]:
         """Linearise the whitened residuals around a model with the added stiffness.
 
         Args:
@@ -347,8 +347,8 @@ def _settled_grid(
     for _ in range(_ROUNDS):
         powers = np.array(list(product(*map(np.unique, np.linspace(ends[0], ends[1], _GRID).T))))
         step = np.ptp(ends, axis=0) / (_GRID - 1)
-        shapes = term.scaled(np.exp(powers @ term.points.T), model)
-        residuals, rows, columns = term.linearised(model, value, shapes)
+        shapes = term.scale_shapes(np.exp(powers @ term.points.T), model)
+        residuals, rows, columns = term.linearise(model, value, shapes)
         signatures = [Signature(pair, np.ones((2, 1)), act_together=True) for pair in columns]
         linear = LinearModel(residuals, rows, np.zeros(len(rows)), rig)
         grid = _Grid(term.quantity, linear, SignatureSet(signatures, rig), cases, powers, step)
@@ -381,8 +381,8 @@ def _gauss_newton_step(term: Term, model: Model, value: Array, shape: Array, bou
     Returns:
         The model, and the added stiffness at the points after the step, complex (p,).
     """
-    shape = term.scaled(shape, model)
-    residuals, rows, columns = term.linearised(model, value, shape)
+    shape = term.scale_shapes(shape, model)
+    residuals, rows, columns = term.linearise(model, value, shape)
     design, coordinates = np.concatenate((rows, columns[0])), term.fit.coordinates
     low, high = coordinate_bounds(coordinates, bounds)
     misfit, best = np.inf, (model, value)

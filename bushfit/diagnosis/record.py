@@ -68,7 +68,7 @@ class MisfitRegion:
         amplitude: lowest and highest amplitude, zero-to-peak [m or rad, or strain].
         component: "storage" or "loss" stiffness of sweeps, or "force" of a loop.
         excess: root mean square of the smooth misfit, measured minus model, in units of its noise.
-        reading: sentence that describes the region.
+        sentence: sentence that describes the region.
     """
 
     direction: Place
@@ -77,7 +77,7 @@ class MisfitRegion:
     amplitude: tuple[float, float]
     component: str
     excess: float
-    reading: str
+    sentence: str
 
 
 @dataclass(frozen=True)
@@ -123,7 +123,7 @@ class Odds:
     fits: tuple[tuple[Model, Covariance] | None, ...] = ()
     labels: tuple[tuple[str, ...], ...] = ()
 
-    def averaged(self, result: Result) -> Result:
+    def widen(self, result: Result) -> Result:
         """Widen the uncertainty of a result by the probability of other explanations.
 
         Args:
@@ -209,12 +209,12 @@ class Diagnosis:
     measure_again: bool = False
 
     @property
-    def changed(self) -> bool:
+    def is_changed(self) -> bool:
         """True if added effects or a corrected record make the final fit differ from the starting fit."""
         return self.after is not self.before
 
     @property
-    def added(self) -> bool:
+    def has_added_effects(self) -> bool:
         """True if the effects of the model to use differ from those of the starting model."""
         return self.result.model.effects != self.before.model.effects
 
@@ -349,6 +349,6 @@ def _region_entry(region: MisfitRegion) -> MisfitRegionEntry:
         f"amplitude_{unit}": [x * factor for x in region.amplitude],
         "component": region.component,
         "excess": region.excess,
-        "reading": region.reading,
+        "reading": region.sentence,
     }
     return cast(MisfitRegionEntry, entry)  # one of its keys is named after the unit

@@ -64,32 +64,32 @@ class RecordingMistake:
         return self.kind.name, self.tests
 
     @property
-    def affected(self) -> list[MeasuredTest]:
+    def affected_tests(self) -> list[MeasuredTest]:
         """Affected tests; empty for a mistake in [bushing]."""
         return [self.data.data_sets[index] for index in self.tests]
 
     @property
     def labels(self) -> tuple[str, ...]:
         """Values of the option --adopt that correct the mistake, "mistake:test" for each affected test."""
-        labels = tuple(option_label(self.kind.name, test.name) for test in self.affected)
+        labels = tuple(option_label(self.kind.name, test.name) for test in self.affected_tests)
         return labels or (self.kind.name,)
 
     @property
     def sentence(self) -> str:
         """Sentence that states the mistake, with the files of the affected tests, or with their names."""
-        files = [file_or_name(test.test) for test in self.affected]
+        files = [file_or_name(test.test) for test in self.affected_tests]
         if len({*files}) < len(files):
-            files = [test.name for test in self.affected]
+            files = [test.name for test in self.affected_tests]
         return self.kind.sentence.format(files=join_names(files))
 
     @property
     def corrections(self) -> tuple[str, ...]:
         """Lines to write into the campaign file to correct the mistake, one for each affected test."""
-        return tuple(self.kind.correction_line(test.test) for test in self.affected) or (
+        return tuple(self.kind.correction_line(test.test) for test in self.affected_tests) or (
             self.kind.correction_line(None),
         )
 
-    def corrected(self) -> PreparedCampaign:
+    def corrected_campaign(self) -> PreparedCampaign:
         """Correct this mistake in a copy of the campaign: in the affected tests, or in the dimensions of the bushing.
 
         Returns:
@@ -100,7 +100,7 @@ class RecordingMistake:
             bushing = data.campaign.bushing and self.kind.corrected_bushing(data.campaign.bushing)
             return replace(data, campaign=replace(data.campaign, bushing=bushing)).with_rubber_conditions()
         loops, sweeps, count = list(data.loops), [sweep.test for sweep in data.sweeps], len(data.loops)
-        for index, affected in zip(self.tests, self.affected, strict=True):
+        for index, affected in zip(self.tests, self.affected_tests, strict=True):
             test = self.kind.corrected_test(affected.test)
             if isinstance(test, Loop):
                 loops[index] = prepare_loops([test], data.campaign.rig, without_outliers=data.robust)[0]
@@ -138,7 +138,7 @@ def correct_adopted(data: PreparedCampaign, names: Collection[str]) -> tuple[Pre
             )
         sentence = f"read as if {mistake.sentence}; {mistake.corrections[0]}"
         messages.append(Caveat("corrected_record", sentence).about(f"corrected by --adopt {name}"))
-        data = mistake.corrected()
+        data = mistake.corrected_campaign()
     return data, messages
 
 
@@ -169,7 +169,7 @@ def possible_mistakes(data: PreparedCampaign, without: Collection[str]) -> list[
             index
             for index, data_set in enumerate(data_sets)
             if option_label(kind.name, data_set.name) not in without
-            and kind.possible(data_set.test)
+            and kind.is_possible(data_set.test)
             and kind.explains(float(moduli[index]), float(strains[index]))
         ]
         groups: list[tuple[int, ...]] = [(index,) for index in indices]

@@ -12,7 +12,7 @@ from functools import reduce
 import numpy as np
 
 from bushfit.caveat import Caveat, join_names
-from bushfit.diagnosis.closing import Closing, close_gap, without_assumed_gain_errors
+from bushfit.diagnosis.closing import ClosedGap, close_gap, without_assumed_gain_errors
 from bushfit.diagnosis.document import Verdict
 from bushfit.diagnosis.explanation_text import (
     causes_text,
@@ -77,7 +77,7 @@ class DiagnosisWriter:
         """Return the diagnosis with all texts: verdict, effects, regions, hold-out, next test, model to use."""
         first, verdict = self.first, self.finding.verdict
         if first is None:
-            return self._build(Closing(self.base), _NOTHING)
+            return self._build(ClosedGap(self.base), _NOTHING)
         mistakes = {reported.best.mistake and reported.best.mistake.key for reported in self.finding.reported}
         if verdict in ("named", "partly", "ambiguous") and first.best.mistake and len(mistakes) == 1:
             return self._record_diagnosis(first)
@@ -94,7 +94,7 @@ class DiagnosisWriter:
             else self._nameless_diagnosis(first, closing)
         )
 
-    def _named_diagnosis(self, first: Composition, closing: Closing) -> Diagnosis:
+    def _named_diagnosis(self, first: Composition, closing: ClosedGap) -> Diagnosis:
         """Diagnosis in which named effects explain the gap, or part of it with a description of the rest."""
         names, base, fit, gap = self.finding.names, self.base, closing.effects_fit, closing.gap
         verbs = ("closes", "explains") if len(names) == 1 else ("close", "explain")
@@ -108,9 +108,9 @@ class DiagnosisWriter:
             part = "more than 99 %" if share > 99.0 else f"{number(share, 2)} %" if share >= 1.0 else "part"
             summary = f"{join_names(names)} {verbs[1]} {part} of the gap"
             if share < 50.0:  # the next test is for the larger part
-                advice = _LEVELS_ADVICE if first.best.levels else get_effect(UNNAMED).confirmed_by
+                advice = _LEVELS_ADVICE if first.best.has_level_errors else get_effect(UNNAMED).confirmed_by
             entries += [NamedCause(UNNAMED, gap.evidence)] if gap else []
-        rest = [part.name for part in first.faulty_parts] + [LEVELS] * first.best.levels
+        rest = [part.name for part in first.faulty_parts] + [LEVELS] * first.best.has_level_errors
         rest += [f"{NAMELESS}, {gap.sentence}" if gap else NAMELESS] * bool(gap or first.unnamed)
         faulty = first.best if first.faulty_parts else None
         return self._build(closing, summary, entries, rest, places=faulty, next_test=advice)
@@ -140,13 +140,13 @@ class DiagnosisWriter:
         if self.finding.verdict == "ambiguous":
             summary += "; correct this first: the tests do not decide yet what else is missing"
         after = without_assumed_gain_errors(best.state.plain, self.search.data)
-        closing = Closing(base, holdout=hold_out(base, after, self.search.data.bounds))
+        closing = ClosedGap(base, holdout=hold_out(base, after, self.search.data.bounds))
         diagnosis = self._build(closing, summary, self._record_entries(first), places=best, next_test=advice)
         warning = Caveat("mistaken_record", f"fitted to the tests as they are; probable mistake: {mistake.sentence}")
         result = replace(diagnosis.result, warnings=(*diagnosis.result.warnings, warning))
         return replace(diagnosis, after=after, remainder=find_regions(after), result=result)
 
-    def _undecided_diagnosis(self, first: Composition, closing: Closing) -> Diagnosis:
+    def _undecided_diagnosis(self, first: Composition, closing: ClosedGap) -> Diagnosis:
         """Diagnosis of a gap with several possible causes: a smooth correction, the causes, and a test that decides."""
         reported, gap = self.finding.reported, closing.gap
         candidates = self._candidates
@@ -163,7 +163,7 @@ class DiagnosisWriter:
         advice = self._deciding_advice(leader)
         return self._build(closing, "; ".join(sentences), entries, places=faulty, next_test=advice)
 
-    def _nameless_diagnosis(self, first: Composition, closing: Closing) -> Diagnosis:
+    def _nameless_diagnosis(self, first: Composition, closing: ClosedGap) -> Diagnosis:
         """Diagnosis of a gap that no known effect explains: a smooth correction, or the tests to measure again."""
         gap, candidates = closing.gap, self._candidates
         advice = self._deciding_advice(candidates[0] if candidates else first)
@@ -204,7 +204,7 @@ class DiagnosisWriter:
         """
         if (mistake := leader.best.mistake) and leader is self.first:
             return f"check the records of the tests; {'; '.join(mistake.corrections)}"
-        fitted = [c for c in self.finding.reported if c.best.effects and c.best.refitted]
+        fitted = [c for c in self.finding.reported if c.best.effects and c.best.is_refitted]
         models, odds = list[Model](), list[float]()
         for composition in fitted:
             model = composition.best.state.fit.model
@@ -232,7 +232,7 @@ class DiagnosisWriter:
                 single.kind.name,
                 why,
                 alternatives,
-                test=next((test.name for test in single.affected), None),
+                test=next((test.name for test in single.affected_tests), None),
                 sentence=single.sentence,
                 correction=single.corrections[0],
             )
@@ -241,7 +241,7 @@ class DiagnosisWriter:
 
     def _build(
         self,
-        closing: Closing,
+        closing: ClosedGap,
         summary: str,
         entries: Sequence[NamedCause] = (),
         remainder: Sequence[str] = (),
@@ -283,7 +283,7 @@ class DiagnosisWriter:
         ends = {name: end for name, value in added.items() if (end := get_parameter(name).reached_bound(value))}
         fitted = replace(fitted, at_bound={**fitted.at_bound, **ends})
         odds = explanation_odds(self.finding)
-        result = with_alternatives(odds.averaged(fitted), self.hypotheses, base, search.settings.tolerance)
+        result = with_alternatives(odds.widen(fitted), self.hypotheses, base, search.settings.tolerance)
         amounts = [format_amount(entry.name, result) for entry in entries]
         leads = "" if places else leads_text(self._candidates, self.finding)  # else measure again first
         rest = [f"the rest: {join_names(remainder)}"] if remainder else []

@@ -52,7 +52,7 @@ def with_alternatives(result: Result, hypotheses: Sequence[Hypothesis], base: Fi
         is_large = hypothesis.change > tolerance
         effects = _rig_effects(hypothesis.effects if is_large else ())
         probability[effects] += share
-        if is_large and hypothesis.refitted and not hypothesis.mistake:
+        if is_large and hypothesis.is_refitted and not hypothesis.mistake:
             members[effects].append(hypothesis)
     current = _rig_effects(result.model.effects) - {*base.model.effects}
     places = {str(test.direction): test.direction for test in base.data_sets}
@@ -70,7 +70,7 @@ def with_alternatives(result: Result, hypotheses: Sequence[Hypothesis], base: Fi
         for name in sorted(effects):
             model = model.with_effect(name, amounts)
         corrected = _with_stiffness_of(result.model, model, places)
-        parameters = result.covariance.restricted([name for name in model.values if name not in names])
+        parameters = result.covariance.select([name for name in model.values if name not in names])
         matrix = block_diag(parameters.matrix, posterior.matrix)
         alternatives.append(Alternative(corrected, share, Covariance((*parameters.names, *posterior.names), matrix)))
     return replace(result, alternatives=tuple(alternatives))

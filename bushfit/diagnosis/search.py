@@ -49,7 +49,7 @@ _RIVALS = 6
 _DISTORTED = 1.5
 
 
-class _Step(NamedTuple):
+class _WeighedState(NamedTuple):
     """Fitted model of the search, with the explanations that may be added to it and their evidence.
 
     Args:
@@ -96,8 +96,8 @@ class Search:
         self._most_effects = max(settings.max_effects - adopted, min(settings.max_effects, 1))
         tests = RecordedTests.of_fit(self.base, self.data.campaign.rig)
         self.root = SearchState.of_tests(tests)
-        self.proposals = proposals(tests.unwhitened, settings.without, self.base.fixed)
-        self._start_rivals = partial(start_rivals, fixed=self.base.fixed, bounds=self.data.bounds)
+        self.proposals = proposals(tests.unwhitened, settings.without, self.base.fixed_names)
+        self._start_rivals = partial(start_rivals, fixed=self.base.fixed_names, bounds=self.data.bounds)
         self._log_priors = prior_odds([*self.proposals, *tests.explanations])
         families = {e.family for e in (*self.outlier_clusters, *tests.explanations) if e.kind == "part"}
         self._meeting_odds = log(ODDS["part"] / max(len(families), 1))
@@ -113,20 +113,20 @@ class Search:
         """
         beam = [self._visit(self.root)]
         for depth in range(ROUNDS + 1):
-            steps = list[_Step]()
+            steps = list[_WeighedState]()
             for state in track(f"round {depth + 1} of at most {ROUNDS + 1}", beam):
                 effects = list[Proposal]()
                 if len(state.effects) < self._most_effects:
                     excluded = (*self.settings.without, *state.effects)
-                    fixed = self.base.fixed if depth < ROUNDS else None  # in the last round nothing is refitted
+                    fixed = self.base.fixed_names if depth < ROUNDS else None  # in the last round nothing is refitted
                     effects = self.proposals if state is self.root else proposals(state.unwhitened, excluded, fixed)
                 sets = SignatureSet.split([effect.signature for effect in effects], state.columns.errors)
                 evidence = state.weigh([*sets, *state.columns.sets])
                 explanations = [*(effect for effect in effects if effect.signature), *state.tests.explanations]
-                steps.append(_Step(state, effects, list(zip(explanations, evidence, strict=True))))
+                steps.append(_WeighedState(state, effects, list(zip(explanations, evidence, strict=True))))
                 for explanation, of_explanation in steps[-1].evidence:
                     log_odds = self._log_odds(explanation.kind, explanation.name)
-                    self._record(state.extended(of_explanation, explanation, log_odds))
+                    self._record(state.extend(of_explanation, explanation, log_odds))
             if depth == ROUNDS or self._is_decided():
                 break
             fresh = list[SearchState]()
@@ -139,7 +139,7 @@ class Search:
                 fresh += self._corrected_records()
                 if self._is_power_law():
                     break
-            followed = [h for h in self._known.values() if h.unnamed in ("", COMPOUND) and not h.levels]
+            followed = [h for h in self._known.values() if h.unnamed in ("", COMPOUND) and not h.has_level_errors]
             limit = max(hypothesis.log_posterior for hypothesis in followed) - LOG_ODDS_CUTOFF
             nearest = sorted(fresh, key=lambda state: -state.log_posterior)
             beam = [state for state in nearest[: BEAM[min(depth, 1)]] if state.log_posterior > limit]
@@ -169,7 +169,7 @@ class Search:
         finding = decide_verdict(self._ordered_hypotheses(), self.settings.tolerance)
         if finding.verdict == "consistent":
             return finding.nothing >= NAMED and self.root.linear.p_value() >= DOES_NOT_FIT
-        return finding.verdict == "named" and finding.reported[0].best.refitted
+        return finding.verdict == "named" and finding.reported[0].best.is_refitted
 
     def _is_power_law(self) -> bool:
         """True if a power law alone has a probability of 97 % or more and fits the tests, so that the search ends."""
@@ -187,7 +187,7 @@ class Search:
             share = np.exp([hypothesis.log_posterior - ordered[0].log_posterior for hypothesis in ordered])
             ahead = (np.cumsum(share) - share) / share.sum()
             candidates = zip(ordered, ahead.tolist(), strict=True)
-            linear = next((h for h, before in candidates if before < NAMED and not h.refitted), None)
+            linear = next((h for h, before in candidates if before < NAMED and not h.is_refitted), None)
             if linear is None:
                 return
             yield linear
@@ -230,11 +230,11 @@ class Search:
             candidates.append(replace(hypothesis, clusters=clusters, log_posterior=log_posterior, change=change))
         for candidate in candidates:
             before = self._known.get(candidate.key)
-            rank = candidate.refitted, candidate.log_posterior
-            if before is None or rank > (before.refitted, before.log_posterior):
+            rank = candidate.is_refitted, candidate.log_posterior
+            if before is None or rank > (before.is_refitted, before.log_posterior):
                 self._known[candidate.key] = candidate
 
-    def _select_effects(self, step: _Step, depth: int) -> list[Proposal]:
+    def _select_effects(self, step: _WeighedState, depth: int) -> list[Proposal]:
         """Select the effects to refit as additions to a state of the search.
 
         These are the effects with the highest evidence in the linearised model, and those with the largest expected
@@ -281,7 +281,7 @@ class Search:
                     grown[name] = candidate
         return list(grown.values())
 
-    def _with_faulty_parts(self, step: _Step) -> Iterator[SearchState]:
+    def _with_faulty_parts(self, step: _WeighedState) -> Iterator[SearchState]:
         """Extend a state by each of its likeliest faulty parts of the tests, with errors of the most probable form."""
         state = step.state
         # the faulty part itself may have distorted the parameters
@@ -360,7 +360,7 @@ class Search:
         possible = possible_mistakes(self.data, self.settings.without)
         for mistake in track("mistakes corrected", list(MistakeScreening(self.data).best(possible, _MISTAKES))):
             with suppress(FitError, ModelError):  # the model cannot be fitted to the corrected tests
-                fit = self.fit_corrected(mistake.corrected())
+                fit = self.fit_corrected(mistake.corrected_campaign())
                 if [test.size for test in fit.data_sets] == [test.size for test in self.base.data_sets]:
                     log_odds = log(ODDS["record"] / len(possible))
                     log_odds -= 0.5 * (modulus_deviation(fit) ** 2 - modulus_deviation(self.base) ** 2)

@@ -67,7 +67,7 @@ class Composition:
     @property
     def nameless(self) -> tuple[str, ...]:
         """Texts for the components without a known effect: errors at one amplitude or frequency, and smooth curves."""
-        return (*([LEVELS] if self.best.levels else []), *([NAMELESS] if self.unnamed else []))
+        return (*([LEVELS] if self.best.has_level_errors else []), *([NAMELESS] if self.unnamed else []))
 
     @property
     def causes(self) -> tuple[str, ...]:
@@ -77,7 +77,7 @@ class Composition:
     @property
     def components(self) -> frozenset[str]:
         """Names that identify the explanation: effects, mistake, kinds of faults, and "unnamed" for a smooth curve."""
-        marks = [f"part: {part.family}" for part in self.faulty_parts] + ["levels"] * self.best.levels
+        marks = [f"part: {part.family}" for part in self.faulty_parts] + ["levels"] * self.best.has_level_errors
         return frozenset((*self.causes, *marks, *["unnamed"] * self.unnamed))
 
     @property
@@ -174,7 +174,7 @@ def _verdict_on_components(likely: Sequence[Composition], nothing: float, leads:
     compensated = best.mistake and (rig_effects or best.faulty_parts)
     if not first.causes or curve or compensated or not fits:
         return Finding("described", nothing, reported, leads)
-    partly = first.unnamed or best.levels or first.faulty_parts or (best.mistake and best.effects)
+    partly = first.unnamed or best.has_level_errors or first.faulty_parts or (best.mistake and best.effects)
     return Finding("partly" if partly else "named", nothing, reported, leads, first.names)
 
 
@@ -203,15 +203,15 @@ def _components_of(hypothesis: Hypothesis) -> frozenset[_Component]:
     deviation, a function of frequency and strain, cannot imitate effects of temperature and preload. A curve without a
     name, or a pattern of faulty parts of the tests, is listed only if there is nothing else.
     """
-    nameless = Level.MATERIAL if hypothesis.compound_deviates or hypothesis.levels else None
-    separable = () if hypothesis.levels else _CONDITIONS
+    nameless = Level.MATERIAL if hypothesis.compound_deviates or hypothesis.has_level_errors else None
+    separable = () if hypothesis.has_level_errors else _CONDITIONS
     effects = [(name, get_effect(name)) for name in hypothesis.effects]
     listed = [name for name, effect in effects if effect.level != nameless or {*effect.depends_on} & {*separable}]
     components: list[_Component] = [("effect", name) for name in listed]
     pattern = is_pattern(hypothesis.faulty_parts)
     if not pattern:
         components += [(f"{_FAULT}{part.family}", part.name) for part in hypothesis.faulty_parts]
-        components += [(f"{_FAULT}levels", "")] * hypothesis.levels
+        components += [(f"{_FAULT}levels", "")] * hypothesis.has_level_errors
     components += [("mistake", hypothesis.mistake.key)] if hypothesis.mistake else []
     return frozenset(components or ([("unnamed", "")] if pattern or hypothesis.unnamed else []))
 
@@ -232,7 +232,7 @@ def compose(pairs: Sequence[tuple[Hypothesis, float]]) -> list[Composition]:
     total, unnamed, merged = (defaultdict[frozenset[_Component], float](float) for _ in range(3))
     for hypothesis, weight in pairs:
         components = _components_of(hypothesis)
-        if components not in best or (hypothesis.refitted and not best[components].refitted):
+        if components not in best or (hypothesis.is_refitted and not best[components].is_refitted):
             best[components] = hypothesis
         total[components] += weight
         unnamed[components] += weight * (bool(hypothesis.unnamed) or is_pattern(hypothesis.faulty_parts))

@@ -34,7 +34,7 @@ from bushfit.geometry import STRAINING, Bushing, Direction, Place
 from bushfit.reading.preload import Preload
 
 if TYPE_CHECKING:
-    from bushfit.effects.unnamed import Unnamed
+    from bushfit.effects.unnamed import SmoothCorrection
 
 #: Frequency [Hz] and strain amplitude [1] at which the effect laws have their reference value; most tests include it.
 REFERENCE_FREQUENCY = 25.0
@@ -165,7 +165,7 @@ class Setting:
     direction: Place
     kind: Literal["sweep", "loop"]
     conditions: RubberConditions = UNKNOWN
-    unnamed: Unnamed | None = None
+    unnamed: SmoothCorrection | None = None
 
 
 @dataclass(frozen=True)

@@ -100,7 +100,7 @@ def stress(p: Values, history: History) -> Array:
         Masing, Proc. 2nd Int. Congr. Appl. Mech., 1926). For other motions 120 elements represent the distribution.
     """
     e_s, spread = np.atleast_1d(p["e_s"]), np.asarray(p["spread"])
-    turning = history.turning
+    turning = history.strokes
     if history.periodic and turning.strides.shape[-1] == 2:
         sense = turning.at_samples(np.sign(turning.strides))
         branch = 2.0 * _first_loading(np.abs(turning.travel) / 2.0, e_s, spread)

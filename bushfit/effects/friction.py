@@ -143,7 +143,7 @@ def _stress_at_turning_points(strides: Array, periodic: bool, eps_half: Array) -
     """Friction stress over sigma_fmax, u, at the start of each of k strokes, (..., k).
 
     Args:
-        strides: signed change of strain in each stroke (see `Turning`) [1], (..., k).
+        strides: signed change of strain in each stroke (see `Strokes`) [1], (..., k).
         periodic: True for a steady cycle, False for a motion from rest.
         eps_half: strain at which the friction stress is half of sigma_fmax [1], (..., 1).
 
@@ -191,7 +191,7 @@ def stress(p: Values, history: History) -> Array:
     >>> stress({"sigma_fmax": 2e4, "eps_half": 0.01}, History(np.array([0.01, 0.0, 0.01]), 1.0, False, 1.0)).round()
     array([10000., -2000.,  8476.])
     """
-    turning, eps_half = history.turning, np.atleast_1d(np.asarray(p["eps_half"], dtype=float))
+    turning, eps_half = history.strokes, np.atleast_1d(np.asarray(p["eps_half"], dtype=float))
     start = _stress_at_turning_points(turning.strides, history.periodic, eps_half)
     distance = np.abs(turning.travel) / eps_half
     return p["sigma_fmax"] * _stroke(turning.at_samples(start), np.sign(turning.travel), distance)

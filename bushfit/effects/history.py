@@ -125,7 +125,7 @@ class History:
         return 2.0 * np.mean(self.value[..., -cycle:] * turn[-cycle:].conj(), axis=-1, keepdims=True) * turn
 
     @cached_property
-    def turning(self) -> Turning:
+    def strokes(self) -> Strokes:
         """Strokes of each motion between its turning points, in order of time; input of the friction laws."""
         count, samples = self.value.shape[-1], np.arange(self.value.shape[-1])
         if self.periodic:
@@ -142,7 +142,7 @@ class History:
         *rows, turns = np.nonzero(turned)
         ends[*rows, passed[turned]] = turns
         levels, piece = _take(path, ends), _take(passed, place)
-        return Turning(np.diff(levels), self.value - _take(levels, piece), _single_row(piece))
+        return Strokes(np.diff(levels), self.value - _take(levels, piece), _single_row(piece))
 
     @cached_property
     def rate(self) -> Array:
@@ -199,7 +199,7 @@ class History:
 
 
 @dataclass(frozen=True, eq=False)
-class Turning:
+class Strokes:
     """Strokes of a motion between its turning points, by which friction and slider laws compute their stress.
 
     A motion from rest begins at 0, before its first sample; a steady cycle begins and ends at its maximum.

@@ -82,7 +82,7 @@ class Mistake(Effect):
         Returns:
             The corrected test, or None if the mistake is not possible in the test.
         """
-        if not self.possible(test):
+        if not self.is_possible(test):
             return None
         direction = self._direction(test.direction)
         if isinstance(test, Loop):
@@ -112,7 +112,7 @@ class Mistake(Effect):
             stiffness=self.force / self.displacement * cycle.stiffness,
         )
 
-    def possible(self, test: Loop | Sweep) -> bool:
+    def is_possible(self, test: Loop | Sweep) -> bool:
         """True if a test of this kind, motion, direction and stiffness can have the mistake."""
         kind, place = "loop" if isinstance(test, Loop) else "sweep", test.direction
         fits = kind in self.kinds and self.motion in (None, place.motion)

@@ -50,7 +50,7 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
     low, high = _ends(p)
     strain = np.maximum(strain, np.finfo(float).tiny)
 
-    def slipping(end: Array) -> Array:
+    def slipping_integral(end: Array) -> Array:
         """Integral of (A + iB) e0/s over ln e_y up to the slip strain `end`, for the sliders that slip (`end` < e0)."""
         r = np.minimum(end / strain, 1.0)
         t = np.arccos(1.0 - 2.0 * r)
@@ -58,7 +58,7 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
         return (turned + 4.0j * (np.log(r) - r)) / np.pi
 
     stuck = 1.0 / np.clip(strain, low, high) - 1.0 / high
-    whole = (slipping(high) - slipping(low)) / strain + stuck
+    whole = (slipping_integral(high) - slipping_integral(low)) / strain + stuck
     return 0.5 * p["sigma"] / np.log(high / low) * whole
 
 
@@ -90,7 +90,7 @@ def stress(p: Values, history: History) -> Array:
         In a steady cycle with two turning points, each half of the loop is the first loading at twice its size (G.
         Masing, Proc. 2nd Int. Congr. Appl. Mech., 1926). For other motions 100 sliders represent the distribution.
     """
-    turning = history.turning
+    turning = history.strokes
     if history.periodic and turning.strides.shape[-1] == 2:  # to and fro
         low, high = _ends(p)
         sense = turning.at_samples(np.sign(turning.strides))
@@ -116,7 +116,7 @@ def parallel_elements(history: History, yield_strain: Array, weights: Array) -> 
     Notes:
         Between two turning points the sum is piecewise linear in the travel, with a knot where an element yields.
     """
-    turning = history.turning
+    turning = history.strokes
     strides, travel = turning.strides[..., None], np.abs(turning.travel)
     longest = max(float(travel.max()), np.finfo(float).tiny)
     leading = np.broadcast_shapes(strides.shape[:-2], yield_strain.shape[:-2])

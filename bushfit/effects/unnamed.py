@@ -81,7 +81,7 @@ class Patch:
 
 
 @dataclass(frozen=True)
-class Unnamed:
+class SmoothCorrection:
     """Smooth relative correction of the stiffness over frequency and strain, for a gap that no known effect explains.
 
     Args:
@@ -124,7 +124,7 @@ class Unnamed:
         """Standard deviation of the real and of the imaginary part of the relative correction, far from all nodes."""
         return self.largest / _DEVIATIONS
 
-    def with_untested(self, place: Place) -> "Unnamed":
+    def with_untested(self, place: Place) -> "SmoothCorrection":
         """Apply the relative correction of the tested directions to an untested direction of the same bushing.
 
         Args:

@@ -17,7 +17,7 @@ import numpy as np
 
 from bushfit.caveat import Caveat
 from bushfit.effects import Level as EffectLevel
-from bushfit.export.contract import MM_T_S_N, Exported, ExportRequest, UnitSystem
+from bushfit.export.contract import MM_T_S_N, ExportedFiles, ExportRequest, UnitSystem
 from bushfit.export.deck import (
     StiffnessForm,
     amplitude_levels,
@@ -39,7 +39,7 @@ _CONSTANTS, _A_LINE = 21, 8
 _FORM = StiffnessForm(lambda f, k: (k.real, k.imag / (2.0 * np.pi * f)), lambda f, a, b: a + 2j * np.pi * f * b)
 
 
-def export(request: ExportRequest) -> Exported:
+def export(request: ExportRequest) -> ExportedFiles:
     """Write an Abaqus connector behavior for each amplitude, and a material at the strains of the first direction.
 
     Args:
@@ -73,7 +73,7 @@ def export(request: ExportRequest) -> Exported:
                 starts = range(0, _CONSTANTS + 1, _A_LINE)
                 lines += [", ".join(texts[start : start + _A_LINE]) for start in starts]
     lines += _materials(request, units, series) if has_material else ()
-    return Exported({"bushing.inp": "".join(f"{line}\n" for line in lines).encode("ascii")}, omissions)
+    return ExportedFiles({"bushing.inp": "".join(f"{line}\n" for line in lines).encode("ascii")}, omissions)
 
 
 def _materials(request: ExportRequest, units: UnitSystem, series: Sequence[PronySeries]) -> Iterator[str]:

@@ -18,7 +18,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from bushfit.caveat import Caveat
-from bushfit.export.contract import Exported, ExportRequest
+from bushfit.export.contract import ExportedFiles, ExportRequest
 from bushfit.export.deck import (
     CARDANIC,
     DOFS,
@@ -95,7 +95,7 @@ class _Element(NamedTuple):
         return Caveat("format_error", f"{subject}: {errors}")
 
 
-def export(request: ExportRequest) -> Exported:
+def export(request: ExportRequest) -> ExportedFiles:
     """Write one file for Adams Car and one for Adams Car Ride.
 
     Args:
@@ -125,7 +125,7 @@ def export(request: ExportRequest) -> Exported:
     files = {
         f"bushing_{kind}.bus": _property_file(request, elements, kind, [*omissions[kind], *shared]) for kind in _KINDS
     }
-    return Exported(files, (*omissions["car"], *omissions["ride"], *shared))
+    return ExportedFiles(files, (*omissions["car"], *omissions["ride"], *shared))
 
 
 def _property_file(

@@ -180,7 +180,7 @@ class ExportRequest:
 
 
 @dataclass(frozen=True, eq=False)
-class Exported:
+class ExportedFiles:
     """Files that an export format makes, and properties of the model that it cannot represent.
 
     Args:

@@ -21,7 +21,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from bushfit.errors import OutputError
-from bushfit.export.contract import Exported, ExportRequest
+from bushfit.export.contract import ExportedFiles, ExportRequest
 from bushfit.export.in_time import FIELDS, TABLES, UNIT_FIELDS, TimeModel, time_model
 from bushfit.geometry import Unit
 from bushfit.reading.tablefile import folder_name
@@ -54,7 +54,7 @@ _NO_XML = re.compile("[\x00-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]")
 _OFFSET = 2
 
 
-def export(request: ExportRequest) -> Exported:
+def export(request: ExportRequest) -> ExportedFiles:
     """Write a model as an FMU with one input and one output per direction or specimen.
 
     Args:
@@ -81,7 +81,7 @@ def export(request: ExportRequest) -> Exported:
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
         for file, data in content.items():  # without dates, so that equal contents give equal bytes
             archive.writestr(zipfile.ZipInfo(file), data, zipfile.ZIP_DEFLATED)
-    return Exported({f"{name}.fmu": buffer.getvalue()}, model.omissions, model.arms)
+    return ExportedFiles({f"{name}.fmu": buffer.getvalue()}, model.omissions, model.arms)
 
 
 def compile_library(sources: Mapping[str, bytes], name: str) -> tuple[str, bytes]:

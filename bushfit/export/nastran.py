@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from bushfit.export.contract import MM_T_S_N, Exported, ExportRequest
+from bushfit.export.contract import MM_T_S_N, ExportedFiles, ExportRequest
 from bushfit.export.deck import (
     StiffnessForm,
     amplitude_levels,
@@ -43,7 +43,7 @@ _DIALECTS = {
 }
 
 
-def export(request: ExportRequest) -> Exported:
+def export(request: ExportRequest) -> ExportedFiles:
     """Write one bushing property per amplitude as bulk data of Nastran or OptiStruct.
 
     PBUSH has the values at the lowest frequency. For several frequencies PBUSHT refers to the tables: a card TABLED1
@@ -77,7 +77,7 @@ def export(request: ExportRequest) -> Exported:
                 points = zip(columns[dof][0], columns[dof][1 + part], strict=True)
                 pairs = [text for f, value in points for text in (format_real(f, 10), format_real(value))]
                 lines += _card("TABLED1*", [table_number, "LINEAR", "LINEAR", *5 * [""], *pairs, "ENDT"])
-    return Exported({file: "".join(f"{line}\n" for line in lines).encode("ascii")}, omissions)
+    return ExportedFiles({file: "".join(f"{line}\n" for line in lines).encode("ascii")}, omissions)
 
 
 def _card(name: str, fields: Sequence[str]) -> Iterator[str]:

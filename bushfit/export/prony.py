@@ -17,7 +17,7 @@ from bushfit.caveat import Caveat
 from bushfit.effects import Level
 from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
-from bushfit.export.contract import Exported, ExportRequest
+from bushfit.export.contract import ExportedFiles, ExportRequest
 from bushfit.geometry import Specimen
 from bushfit.model.arms import Arms, fitted_arms, values_under
 from bushfit.prediction.caveats import format_deviation
@@ -131,7 +131,7 @@ def prony_omissions(series: Sequence[PronySeries]) -> Iterator[Caveat]:
     yield Caveat("format_omission", sentence)
 
 
-def export(request: ExportRequest) -> Exported:
+def export(request: ExportRequest) -> ExportedFiles:
     """Write the Prony series of the compound as a table, a row per term.
 
     Args:
@@ -160,4 +160,4 @@ def export(request: ExportRequest) -> Exported:
         for term, (relative, time) in enumerate(zip(one.relative_moduli, one.arms.time, strict=True), start=1)
     ]
     table = to_csv(pd.DataFrame(rows), decimal_comma=request.decimal_comma)
-    return Exported({"prony.csv": table}, tuple(prony_omissions(series)))
+    return ExportedFiles({"prony.csv": table}, tuple(prony_omissions(series)))

@@ -221,7 +221,7 @@ def prior_uses(steps: Sequence[FitResult], fixed: Covariance | None) -> dict[str
         known = covariance(last.model, stages, fixed, last.smooth_error)
         estimated = {name: step.model.values[name] for step in alone for name in step.names}
         values = weak.with_values(estimated).values
-        names = [name for name in prior.names if name in known.names and name in {*estimated, *model.tied}]
+        names = [name for name in prior.names if name in known.names and name in {*estimated, *model.tied_names}]
         coordinates = Coordinates.of_parameters(model, names)
         mean = dict(zip(prior.names, prior.mean.tolist(), strict=True))
         deviation = dict(zip(prior.names, np.sqrt(np.diag(prior.covariance)).tolist(), strict=True))

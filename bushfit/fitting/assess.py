@@ -74,7 +74,7 @@ def covariance(
         _LARGEST_ERROR, so that combinations that the data do not determine get a finite error.
     """
     fixed, stages = fixed or Covariance(), [stage for stage in stages if stage.names]
-    fixed = fixed.restricted([name for name in fixed.names if name not in model.tied])
+    fixed = fixed.select([name for name in fixed.names if name not in model.tied_names])
     names = (*fixed.names, *(name for stage in stages for name in stage.names))
     slopes = Coordinates.of_parameters(model, names).slopes(model.values)
     system, root = np.eye(len(names)), np.zeros((len(names), len(names)))
@@ -130,7 +130,7 @@ def covariance(
         spread.append(change)
     mixing = np.vstack([np.eye(len(names)), model.constraints.slopes(model.values, names).T])
     with_ties = (mixing @ part @ mixing.T for part in (matrix, *spread))
-    return Covariance((*names, *model.tied), next(with_ties), tuple(with_ties))
+    return Covariance((*names, *model.tied_names), next(with_ties), tuple(with_ties))
 
 
 def _changes_by_noise(

@@ -128,7 +128,7 @@ def coordinate_changes(model: Model, names: Sequence[str], changed: Sequence[str
     Returns:
         Derivatives, (k, c).
     """
-    sizes = Coordinates.of_parameters(model, (*names, *model.tied)).slopes(model.values)
+    sizes = Coordinates.of_parameters(model, (*names, *model.tied_names)).slopes(model.values)
     by_value = np.hstack((np.eye(len(names)), model.constraints.slopes(model.values, names)))
-    by_name = dict(zip((*names, *model.tied), (by_value * sizes[: len(names), None] / sizes).T, strict=True))
+    by_name = dict(zip((*names, *model.tied_names), (by_value * sizes[: len(names), None] / sizes).T, strict=True))
     return np.array([by_name.get(name, np.zeros(len(names))) for name in changed]).reshape(len(changed), len(names)).T

@@ -16,7 +16,7 @@ from scipy.special import stdtrit
 
 from bushfit.effects.contract import Array
 from bushfit.effects.temperature import REFERENCE
-from bushfit.effects.unnamed import Patch, Unnamed
+from bushfit.effects.unnamed import Patch, SmoothCorrection
 from bushfit.fitting.coordinates import ROUNDING
 from bushfit.fitting.preparation import MeasuredTest, log_slopes, operating_conditions, residual_slices
 from bushfit.fitting.problem import FitResult
@@ -226,7 +226,7 @@ class Discrepancy:
         gains = self.likelihood.gains(self.sizes)
         return float(gains.max()), float(self.sizes[gains.argmax()])
 
-    def conditioned(self) -> tuple[Array, Array]:
+    def condition(self) -> tuple[Array, Array]:
         """Condition the Gaussian process of the model's error, at its likeliest size, on the tests.
 
         Returns:
@@ -247,7 +247,7 @@ class Discrepancy:
         return mean, np.array([np.linalg.norm(whole.real, axis=0), np.linalg.norm(whole.imag, axis=0)])
 
 
-def average_processes(processes: Sequence[Discrepancy]) -> Unnamed:
+def average_processes(processes: Sequence[Discrepancy]) -> SmoothCorrection:
     """Average Gaussian processes of a model's error, weighted by likelihood, into one correction of the stiffness.
 
     Only processes that group directions as the likeliest process does are averaged, because the members of a group
@@ -264,7 +264,7 @@ def average_processes(processes: Sequence[Discrepancy]) -> Unnamed:
     share /= share.sum()
     freedom = float(share @ [process.likelihood.freedom(process.maximum[1]) for process in processes])
     wider = float(stdtrit(max(freedom, _MINIMUM_FREEDOM), 0.975)) / Z95
-    means, errors = zip(*(process.conditioned() for process in processes), strict=True)
+    means, errors = zip(*(process.condition() for process in processes), strict=True)
     mean = share @ np.array(means)
     deviations = np.array([[np.square((one - mean).real), np.square((one - mean).imag)] for one in means])
     error = wider * np.sqrt(np.tensordot(share, np.square(errors) + deviations, 1))
@@ -275,7 +275,7 @@ def average_processes(processes: Sequence[Discrepancy]) -> Unnamed:
         lists = (mean[nodes].real, mean[nodes].imag, *error[:, nodes])
         frequency, strain, *kelvin = (tuple(axis[nodes].tolist()) for axis in best.tests.conditions)
         patches.append(Patch(group, frequency, strain, *(tuple(row.tolist()) for row in lists), *kelvin))
-    return Unnamed(size, (float(lengths[0]), float(lengths[1])), tuple(patches))
+    return SmoothCorrection(size, (float(lengths[0]), float(lengths[1])), tuple(patches))
 
 
 def candidate_processes(tests: FittedTests) -> list[Discrepancy]:

@@ -340,7 +340,7 @@ class MeasuredSweep(MeasuredBase):
         difference = (self.response(model) - self.measured) / self.response_size
         return np.stack((difference.real, difference.imag))
 
-    def normalised(self, deviation: Array, *, shared: bool = True) -> Array:
+    def normalise(self, deviation: Array, *, shared: bool = True) -> Array:
         """Divide the deviations in gain and phase by the random noise of each point, without whitening.
 
         Args:
@@ -363,18 +363,18 @@ class MeasuredSweep(MeasuredBase):
 
         The likeliest error that all points of a run share is subtracted first.
         """
-        return np.hypot(*self.normalised(self.deviation(self.response(model)))) / np.sqrt(2.0)
+        return np.hypot(*self.normalise(self.deviation(self.response(model)))) / np.sqrt(2.0)
 
     def displayed_residual(self, model: Model) -> Array:
         """Whitened residuals for charts, (2 n,); points without weight are divided by their random noise only."""
         deviation = self.deviation(self.response(model))
-        return np.where(np.tile(self.weights > 0.0, 2), self.whiten(deviation), self.normalised(deviation).ravel())
+        return np.where(np.tile(self.weights > 0.0, 2), self.whiten(deviation), self.normalise(deviation).ravel())
 
     def outlier_indices(self, model: Model) -> Array:
         """Indices of the outliers, (k,): points far from the model and their neighbours; see `outlying_points`."""
         points, freedom = np.stack((self.frequency, self.amplitude)), self.noise.random_freedom or np.inf
         deviation = self.deviation(self.response(model))
-        return outlying_points(deviation, self.normalised, self.block_starts, points, freedom)
+        return outlying_points(deviation, self.normalise, self.block_starts, points, freedom)
 
     def outliers(self, points: Array, model: Model) -> Iterator[Outlier]:
         """Yield file, row and distance from the model [units of noise] of the points with the indices `points`."""

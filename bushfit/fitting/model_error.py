@@ -26,7 +26,7 @@ import numpy as np
 from bushfit.campaign.schema import UNSTATED, RigSettings
 from bushfit.caveat import Caveat
 from bushfit.effects import BASE
-from bushfit.effects.unnamed import Unnamed
+from bushfit.effects.unnamed import SmoothCorrection
 from bushfit.errors import FitError, ModelError
 from bushfit.fitting.assess import excess_chi_square
 from bushfit.fitting.coordinates import ROUNDING, Bounds, Coordinates, prior_covariance
@@ -74,7 +74,7 @@ _MAXIMUM_ROUNDS, _SETTLED = 12, 0.02
 
 def with_excess_errors(
     plain_fit: FitResult, bounds: Bounds, rig: RigSettings, refit: Callable[[Model, LevelErrors], FitResult]
-) -> tuple[FitResult, Unnamed | None, list[Caveat]]:
+) -> tuple[FitResult, SmoothCorrection | None, list[Caveat]]:
     """Repeat a fit with errors beyond the noise that its tests show: of the model, or shared by the runs of a level.
 
     A level is one constant amplitude or frequency. If levels disagree by more than chance explains, the rig or the
@@ -101,7 +101,7 @@ def with_excess_errors(
 
 def _with_excess_errors(
     plain_fit: FitResult, bounds: Bounds, rig: RigSettings, refit: Callable[[Model, LevelErrors], FitResult]
-) -> tuple[FitResult, Unnamed | None, list[Caveat]]:
+) -> tuple[FitResult, SmoothCorrection | None, list[Caveat]]:
     """Repeat a fit with the errors that its tests show, see `with_excess_errors`; its priors are taken as right."""
     found, error = with_model_error(plain_fit, bounds, rig)
     if error:
@@ -128,7 +128,7 @@ def _with_excess_errors(
 
 def with_model_error(
     plain_fit: FitResult, bounds: Bounds, rig: RigSettings = UNSTATED, *, certain: bool = False
-) -> tuple[FitResult, Unnamed | None]:
+) -> tuple[FitResult, SmoothCorrection | None]:
     """Refit a model that misses its tests, with an error of the model added to the noise; otherwise keep the fit.
 
     Args:

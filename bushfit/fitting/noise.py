@@ -229,9 +229,9 @@ def _pool_variances(
     well_known = [level for level in measured if level.freedom >= _SEPARATE_SCATTER]
     compared = sorted(well_known or measured, key=lambda level: -float(level.variance.sum()))
     for i, level in enumerate(compared):  # a single outlier may make variances unequal
-        if level.without_largest and _unequal(compared):
+        if level.without_largest and _variances_differ(compared):
             compared[i] = level.without_largest
-    equal = not _unequal(compared)
+    equal = not _variances_differ(compared)
     few = [level for level in measured if well_known and level.freedom < _SEPARATE_SCATTER]
     counted = [*compared, *few] if equal else measured
     freedoms = [level.freedom for level in counted]
@@ -269,7 +269,7 @@ def _as_pair(values: Array) -> tuple[float, float]:
     return gain, phase
 
 
-def _unequal(levels: Sequence[LevelNoise]) -> bool:
+def _variances_differ(levels: Sequence[LevelNoise]) -> bool:
     """True if the variances of levels differ at a significance level of 0.1 %, by Bartlett's test (1937)."""
     variance = np.array([level.variance.mean() for level in levels])
     freedom = np.array([2.0 * level.freedom for level in levels])

@@ -214,7 +214,7 @@ class PreparedCampaign:
             data_sets: tests to fit.
             fixed: names of further parameters that this fit keeps fixed.
         """
-        names = [name for name in self.free_names(tuple(model.parameters)) if name not in (*fixed, *model.tied)]
+        names = [name for name in self.free_names(tuple(model.parameters)) if name not in (*fixed, *model.tied_names)]
         return FitProblem(model, data_sets, names, self.bounds)
 
     def free_names(self, names: Sequence[str]) -> tuple[str, ...]:

@@ -53,7 +53,7 @@ class FitProblem:
             fixed: names of the fixed parameters.
             bounds: limits of parameters [SI] by name, inside their default limits.
         """
-        return cls(model, tests, [name for name in model.parameters if name not in (*fixed, *model.tied)], bounds)
+        return cls(model, tests, [name for name in model.parameters if name not in (*fixed, *model.tied_names)], bounds)
 
     @cached_property
     def coordinates(self) -> Coordinates:
@@ -81,7 +81,7 @@ class FitProblem:
         Returns:
             Residuals of the n points and of the p priors of the model, (n + p,), and their derivatives, (k, n + p).
         """
-        free, varied = len(self.names), (*self.names, *model.tied)
+        free, varied = len(self.names), (*self.names, *model.tied_names)
         of_priors, prior_slopes = prior_rows(model, self.names)
         count = sum(test.size for test in self.tests)
         rows = np.zeros((1 + len(varied), count + of_priors.size))
@@ -94,7 +94,7 @@ class FitProblem:
                 of_test = test.keep("rows", model, np.vstack(difference_quotients(stepped, steps)), varied)
             rows[:, block] = of_test
         residual, jacobian = rows[0], rows[1:]
-        if model.tied:
+        if model.tied_names:
             jacobian = jacobian[:free] + model.constraints.slopes(model.values, self.names) @ jacobian[free:]
         jacobian *= self.coordinates.slopes(model.values)[:, None]
         residual[count:], jacobian[:, count:] = of_priors, prior_slopes
@@ -203,7 +203,7 @@ class FitResult:
         return slice(min(rows.start for rows in slices), max(rows.stop for rows in slices))
 
     @property
-    def fixed(self) -> list[str]:
+    def fixed_names(self) -> list[str]:
         """Names of the parameters that the fit kept at their values."""
         return [name for name in self.model.values if name not in self.names]
 

@@ -136,7 +136,7 @@ def fit_static(data: PreparedCampaign, springpot: Result | None = None) -> Resul
     if len(fixed) < len(DYNAMIC):
         found = _fit_without_springpot(data)
         return _with_campaign(data, [found], build_result([found], data.bounds), [_springpot_warning(data, found)])
-    uncertainty = springpot.covariance.restricted(DYNAMIC) if springpot else None
+    uncertainty = springpot.covariance.select(DYNAMIC) if springpot else None
     found = _fit_step(data, data.static_loops(), fixed)
     return _with_campaign(data, [found], build_result([found], data.bounds, fixed=uncertainty))
 
@@ -153,7 +153,7 @@ def fit_dynamic(data: PreparedCampaign, static: Result) -> Result:
     """
     fixed = {name: static.model.values[name] for name in STATIC}
     found = _fit_step(data, [data.smallest_sweep], fixed)
-    result = build_result([found], data.bounds, fixed=static.covariance.restricted(STATIC))
+    result = build_result([found], data.bounds, fixed=static.covariance.select(STATIC))
     return _with_campaign(data, [found], result)
 
 
@@ -356,7 +356,7 @@ def fit_warnings(
         Warnings, in the order of the fit; if nothing was fitted, how well the given values agree with the tests.
     """
     tests, names, at_bound = step.data_sets, step.names, step.at_bound
-    if unknown := covariance.restricted(names).describe_unknown(model.values):
+    if unknown := covariance.select(names).describe_unknown(model.values):
         yield Caveat("parameter_unknown", unknown)
     yield from (note.about(test.name) for test in tests for note in test.notes)
     if not names:

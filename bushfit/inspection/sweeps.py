@@ -287,7 +287,7 @@ def odd_losses(sweep: Sweep) -> Iterator[Caveat]:
             f"{negative.size} point{'s' * (negative.size > 1)} with a loss factor below zero, the first at "
             f"{sweep.frequency[negative[0]]:.4g} Hz, {level}: is the force channel late?",
         )
-    mistakes = [mistake for mistake in MISTAKES.values() if mistake.doubt and mistake.possible(sweep)]
+    mistakes = [mistake for mistake in MISTAKES.values() if mistake.doubt and mistake.is_possible(sweep)]
     if mistakes:
         causes = ", or ".join(mistake.sentence_for(sweep) for mistake in mistakes)
         loss = number(float(np.median(loss_factor(sweep.stiffness))), 2)

@@ -84,7 +84,7 @@ class Covariance:
 
     def may_be_zero(self, values: Mapping[str, float]) -> bool:
         """True if the estimates of some parameters [SI] do not differ from zero together, by Wald's test at 95 %."""
-        part = self.restricted([*values])
+        part = self.select([*values])
         deviations = np.linalg.lstsq(part.root, np.array([values[name] for name in part.names]))[0]
         return bool(deviations @ deviations <= chdtri(len(part.names), 0.05))
 
@@ -119,7 +119,7 @@ class Covariance:
         spread = tuple(np.pad(part, padding) for part in self.spread)
         return Covariance((*self.names, *names), np.pad(self.matrix, padding) + variance, spread)
 
-    def restricted(self, names: Sequence[str]) -> "Covariance":
+    def select(self, names: Sequence[str]) -> "Covariance":
         """Covariance of the named parameters only, in the order of this covariance; unknown names are ignored."""
         indices = [i for i, name in enumerate(self.names) if name in names]
         square = np.ix_(indices, indices)

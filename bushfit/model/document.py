@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import AfterValidator, ConfigDict, Field
 
 from bushfit.effects import Origin
-from bushfit.effects.unnamed import Unnamed
+from bushfit.effects.unnamed import SmoothCorrection
 from bushfit.errors import ModelError
 from bushfit.geometry import CouponKind, Shape, StatedStrain
 from bushfit.model.result import CampaignTable as CampaignTable
@@ -233,7 +233,7 @@ class AlternativeTable:
     values: Mapping[str, Number]
     probability: Annotated[Number, Field(ge=0.0, le=1.0)]
     covariance: Annotated[CovarianceTable, AfterValidator(_check_covariance)] = CovarianceTable((), ())
-    unnamed: Unnamed | None = None
+    unnamed: SmoothCorrection | None = None
 
 
 @dataclass(frozen=True)
@@ -275,8 +275,8 @@ class ModelFile:
     )
     fit: FitTable | None = None
     unresolved: tuple[str, ...] = ()
-    unnamed: Unnamed | None = None
-    model_error: Unnamed | None = None
+    unnamed: SmoothCorrection | None = None
+    model_error: SmoothCorrection | None = None
     alternatives: tuple[AlternativeTable, ...] = ()
     warnings: Annotated[tuple[str, ...], Field(max_length=10000)] = ()
     warning_kinds: Annotated[tuple[str, ...], Field(max_length=10000)] = ()

@@ -14,7 +14,7 @@ from bushfit.effects import BASE, Branch, Effect, Level, Parameter, Setting, get
 from bushfit.effects.contract import UNKNOWN, Array, RubberConditions, Value, Values
 from bushfit.effects.history import History
 from bushfit.effects.unnamed import NAME as UNNAMED
-from bushfit.effects.unnamed import Unnamed
+from bushfit.effects.unnamed import SmoothCorrection
 from bushfit.errors import ModelError
 from bushfit.geometry import Bushing, Direction, Place
 from bushfit.model.constraints import UNCONSTRAINED, Constraints
@@ -48,7 +48,7 @@ class Model:
     bushing: Bushing | None
     effects: tuple[str, ...]
     values: Mapping[str, float]
-    unnamed: Unnamed | None = None
+    unnamed: SmoothCorrection | None = None
     constraints: Constraints = field(default=UNCONSTRAINED, compare=False)
 
     def __post_init__(self) -> None:
@@ -89,7 +89,7 @@ class Model:
         return Model, (self.bushing, self.effects, dict(self.values), self.unnamed, self.constraints)
 
     @cached_property
-    def tied(self) -> tuple[str, ...]:
+    def tied_names(self) -> tuple[str, ...]:
         """Names of the parameters whose values follow from other parameters."""
         return tuple(tie.name for tie in self.constraints.active_ties(self.values))
 
@@ -165,7 +165,7 @@ class Model:
         bushing: Bushing | None,
         effects: Sequence[str],
         values: Mapping[str, float],
-        unnamed: Unnamed | None = None,
+        unnamed: SmoothCorrection | None = None,
         constraints: Constraints = UNCONSTRAINED,
     ) -> "Model":
         """Create a model; parameters without a given value have their neutral value, or else a typical value.

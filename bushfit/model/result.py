@@ -11,7 +11,7 @@ from pydantic import Field
 from bushfit.caveat import Caveat, join_names
 from bushfit.effects import BASE
 from bushfit.effects.unnamed import NAME as UNNAMED
-from bushfit.effects.unnamed import Unnamed
+from bushfit.effects.unnamed import SmoothCorrection
 from bushfit.errors import ModelError
 from bushfit.geometry import Bushing, Direction, Place, Specimen, get_place
 from bushfit.model.covariance import Covariance
@@ -303,7 +303,7 @@ class Result:
     tests: tuple[Misfit, ...] = ()
     usable: tuple[ExpectedError, ...] = ()
     unresolved: tuple[str, ...] = ()
-    model_error: Unnamed | None = None
+    model_error: SmoothCorrection | None = None
     alternatives: tuple[Alternative, ...] = ()
     campaign: CampaignTable | None = None
     ties: Mapping[str, str] = field(default_factory=dict)
@@ -342,7 +342,7 @@ class Result:
         return [*dict.fromkeys(specimen.bushing for specimen in self.specimens if specimen.bushing)]
 
     @property
-    def undecided(self) -> list[Caveat]:
+    def rival_warnings(self) -> list[Caveat]:
         """Warning that the tests do not rule out other models, in a list; empty if they do."""
         if not self.alternatives:
             return []

@@ -93,9 +93,9 @@ def transfer_compound(result: Result, bushing: Bushing) -> tuple[Result, Caveat]
     elsewhere = Result(
         model,
         fitted=tuple(name for name in result.fitted if name in model.values),
-        covariance=result.covariance.restricted([*model.values]),
+        covariance=result.covariance.select([*model.values]),
         measured=measured,
-        warnings=tuple(line.about(result.name) for line in result.warnings if line not in result.undecided),
+        warnings=tuple(line.about(result.name) for line in result.warnings if line not in result.rival_warnings),
         inputs=result.inputs,
         specimens=coupons,
         unresolved=tuple(name for name in result.unresolved if name in model.effects),

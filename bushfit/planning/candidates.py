@@ -11,7 +11,7 @@ from bushfit.diagnosis.next_test import within_limits
 from bushfit.errors import ModelError
 from bushfit.geometry import Direction, Place, bushing_at
 from bushfit.planning.contract import Knowledge, PlanRequest, Test, operating_points
-from bushfit.simulation.undisturbed import PAPER_LOOPS, PAPER_SWEEPS
+from bushfit.simulation.exact import PAPER_LOOPS, PAPER_SWEEPS
 
 #: Cycles of the candidate loops: few, and enough to make the noise of the rows negligible.
 _LOOP_CYCLES = (3, 20)

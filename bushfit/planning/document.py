@@ -160,7 +160,7 @@ def plan_document(
     minutes = (budget.minutes[search.runs] + budget.setup_minutes * changes).tolist()
     covariances = [search.error_covariance(counts) for counts in (0 * planned, planned, standard)]
 
-    def compared(error: Callable[[Array], float]) -> ErrorComparison:
+    def compare_error(error: Callable[[Array], float]) -> ErrorComparison:
         """Compare an error before further tests, with the plan and with the standard programme.
 
         `error` computes it from a covariance of the parameters.
@@ -170,7 +170,7 @@ def plan_document(
 
     errors = defaultdict[str, dict[str, ErrorComparison]](dict)
     for quantity in search.predictions:
-        errors[quantity.name.partition(".")[0]][str(quantity.place)] = compared(quantity.rms_error)
+        errors[quantity.name.partition(".")[0]][str(quantity.place)] = compare_error(quantity.rms_error)
     rivals: Rivalry | None = None
     if knowledge.rivals:
         rivals = {
@@ -190,11 +190,11 @@ def plan_document(
         "hours_left": request.hours - sum(minutes) / 60.0,
         "enough": enough,
         "targets": {
-            goal.name: {"asked": goal.target, **compared(goal.half_width), "met": reason is None, "why": reason}
+            goal.name: {"asked": goal.target, **compare_error(goal.half_width), "met": reason is None, "why": reason}
             for goal, reason in zip(search.goals, missed, strict=True)
         },
         "parameters": {
-            quantity.name: compared(quantity.rms_error) for quantity in PlannedQuantity.parameters(knowledge)
+            quantity.name: compare_error(quantity.rms_error) for quantity in PlannedQuantity.parameters(knowledge)
         },
         "stiffness": errors["stiffness"],
         "loss_factor": errors["loss_factor"],

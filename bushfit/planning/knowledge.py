@@ -47,7 +47,7 @@ def from_result(result: Result, noise: Noise | None = None, source: str = "") ->
         size = Coordinates.of_parameters(model, names).slopes(model.values) * coordinate_per_relative_change(
             model, names
         )
-        covariance, origin = fitted.restricted(names).matrix / np.outer(size, size), "a fitted model"
+        covariance, origin = fitted.select(names).matrix / np.outer(size, size), "a fitted model"
     return Knowledge(result, names, covariance, source or origin, noise or Noise())
 
 

@@ -148,7 +148,7 @@ def uncertainty(result: Result, model: Model, points: OperatingPoints) -> Uncert
     """
     place, frequency, amplitude, conditions = points
     names = [name for name in result.covariance.names if name in model.values]
-    covariance = result.covariance.restricted(names)
+    covariance = result.covariance.select(names)
     correction = model.unnamed or (result.model_error and result.model_error.with_untested(place))
     if not correction:
         return Uncertainty(covariance, np.ones(frequency.size), np.empty((0, frequency.size)))
@@ -156,7 +156,7 @@ def uncertainty(result: Result, model: Model, points: OperatingPoints) -> Uncert
         model.setting(place, conditions=conditions), 2.0 * np.pi * frequency, amplitude
     )
     relative = error / (1.0 + share) if model.unnamed else np.hypot(error, [share.real, share.imag])
-    left_out = result.covariance.restricted([name for name in result.covariance.names if name not in model.values])
+    left_out = result.covariance.select([name for name in result.covariance.names if name not in model.values])
     stiffness, slopes = stiffness_and_slopes(
         result.model, place, frequency, amplitude, left_out.names, conditions=conditions
     )

@@ -61,7 +61,7 @@ def caveats(result: Result) -> Iterator[Caveat]:
         twins = " or ".join(get_effect(name).twins)
         sentence = f"{name} is assigned to the bushing, but these tests cannot distinguish it from {twins}"
         yield Caveat("effect_may_be_rig", sentence)
-    yield from result.undecided
+    yield from result.rival_warnings
     if "springpot" not in result.model.effects:
         yield Caveat("no_springpot", "the model has no springpot: its stiffness does not depend on frequency")
     if unnamed := result.model.unnamed:

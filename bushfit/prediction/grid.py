@@ -14,8 +14,8 @@ from bushfit.model.result import Result
 from bushfit.prediction.caveats import MARGIN
 from bushfit.reading.measurement import Sweep
 from bushfit.reading.runs import nominal_amplitudes
-from bushfit.simulation.undisturbed import PAPER_AMPLITUDES as PAPER_AMPLITUDES
-from bushfit.simulation.undisturbed import PAPER_FREQUENCIES as PAPER_FREQUENCIES
+from bushfit.simulation.exact import PAPER_AMPLITUDES as PAPER_AMPLITUDES
+from bushfit.simulation.exact import PAPER_FREQUENCIES as PAPER_FREQUENCIES
 
 #: Frequencies, amplitudes or other numbers of a grid.
 Numbers = Sequence[float] | Array

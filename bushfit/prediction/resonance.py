@@ -108,24 +108,24 @@ def predict_resonance(
     frequency = np.asarray(frequencies, dtype=float)
     base = base_acceleration / (2.0 * np.pi * frequency) ** 2
 
-    def shaken(model: Model) -> PredictedResonance:
+    def response_of(model: Model) -> PredictedResonance:
         """Response of the mass to the shaken base, predicted with one model; warnings are added later."""
         stiffness_at = partial(model.stiffness, place, frequency, conditions=conditions)
         amplitude, ratio = shaken_response(stiffness_at, mass, frequency, base)
         stiffness = stiffness_at(amplitude)
         return PredictedResonance(place, mass, base_acceleration, frequency, amplitude, ratio, stiffness)
 
-    predicted, if_in_rig = shaken(bushings), shaken(rig_models[-1]) if rig_models else None
+    predicted, if_in_rig = response_of(bushings), response_of(rig_models[-1]) if rig_models else None
     near = np.abs(predicted.transmissibility) >= min(_NEAR_PEAK, predicted.peak[1])
     subject = f"{place}, resonance of {number(mass, 3)} kg"
     points = OperatingPoints(place, frequency[near], predicted.amplitude[near], conditions)
     warnings = [*unfitted_warnings(result, place), *extrapolations(result, points, subject)]
     if result.alternatives:
-        peaks = np.array([shaken(model).peak for source, model in models if source is not result])
+        peaks = np.array([response_of(model).peak for source, model in models if source is not result])
         (low, smallest), (high, largest) = peaks.min(axis=0), peaks.max(axis=0)
         span = f"{number(low, 4)} to {number(high, 4)} Hz, |T| {number(smallest, 4)} to {number(largest, 4)}"
         spread = Caveat("resonance_range", f"{span}, for all models that agree with the tests")
-        warnings += [*result.undecided, spread.about(subject)]
+        warnings += [*result.rival_warnings, spread.about(subject)]
     if if_in_rig:
         peak, ratio = (number(value, 4) for value in if_in_rig.peak)
         sentence = f"at {peak} Hz, |T| {ratio}, with {join_names(result.unresolved)} in the rig"

@@ -198,7 +198,7 @@ def _warnings(result: Result, response: TimeResponse, left_out: list[str]) -> It
         left_out: names of the effects that the response leaves out.
     """
     place, history, length = response.direction, response.history, response.direction.display.displacement
-    yield from result.undecided
+    yield from result.rival_warnings
     yield from unfitted_warnings(result, place)
     if result.measured:
         largest = max(np.abs(history.value).max(), result.measured.strain[0] / response.unit_strain)
@@ -221,7 +221,7 @@ def _warnings(result: Result, response: TimeResponse, left_out: list[str]) -> It
     if constant := result.model.constant_modifiers:
         sine = f"{number(history.frequency, 3)} Hz and {length.text(history.amplitude.item())}"
         yield Caveat("constant_effects", f"{join_names(constant)} constant, as in a sine of {sine}").about(place)
-    strokes, start = np.abs(history.turning.strides), abs(float(history.value[0]))
+    strokes, start = np.abs(history.strokes.strides), abs(float(history.value[0]))
     if not history.periodic and start > _JUMP * np.abs(np.diff(history.value)).max():
         sentence = f"the history begins at {length.text(start)}, but the model starts from rest at 0"
         advice = "Begin the history at rest, or subtract its first value"

@@ -167,7 +167,7 @@ def point_warnings(
         Warnings.
     """
     place, measured, stiffness = prediction.direction, prediction.measured, prediction.stiffness.value
-    yield from result.undecided
+    yield from result.rival_warnings
     yield from unfitted_warnings(result, place)
     confirmed = np.zeros(stiffness.shape, dtype=bool)
     if measured is not None and agrees_within_noise(result, place):

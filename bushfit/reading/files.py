@@ -207,15 +207,15 @@ def to_utf8(data: bytes, file: Path, stated_encoding: str | None = None) -> tupl
         without_mark = data.removeprefix(codecs.BOM_UTF8)
         if (bad := not_utf8(without_mark)) is None:
             return _plain_bytes(without_mark), "utf-8"
-        raise _undecodable(data, file, bad, "utf-8")
+        raise _decoding_error(data, file, bad, "utf-8")
     raw = io.BytesIO(data)
     try:
         text = io.TextIOWrapper(raw, encoding, newline="")  # decoded in one piece, it would take four times its bytes
         parts = [part.encode("utf-8", "replace") for part in iter(lambda: text.read(CHUNK_BYTES), "")]
     except UnicodeDecodeError as error:
-        raise _undecodable(data, file, raw.tell() - len(error.object) + error.start, encoding) from None
+        raise _decoding_error(data, file, raw.tell() - len(error.object) + error.start, encoding) from None
     except UnicodeError:  # UTF-16 or UTF-32 without a byte order mark
-        raise _undecodable(data, file, 0, encoding) from None
+        raise _decoding_error(data, file, 0, encoding) from None
     except LookupError:
         raise MeasurementError(**ERRORS["unknown_encoding"], file=file, found=f'"{stated_encoding}"') from None
     return _plain_bytes(b"".join(parts).removeprefix(codecs.BOM_UTF8)), encoding
@@ -298,7 +298,7 @@ def detect_encoding(data: bytes) -> str:
     return "latin-1"
 
 
-def _undecodable(data: bytes, file: Path, bad: int, encoding: str) -> MeasurementError:
+def _decoding_error(data: bytes, file: Path, bad: int, encoding: str) -> MeasurementError:
     """Error for the byte at index `bad`, which is not valid in the encoding."""
     return MeasurementError(
         "this is not text" if data[bad] == 0 else f"this is not {encoding.upper()} text",

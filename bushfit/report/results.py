@@ -176,7 +176,7 @@ def write_files(folder: Path, contents: Mapping[str, bytes]) -> None:
     except OSError as error:
         with suppress(OSError):  # remove the folder if it is still empty
             folder.rmdir()
-        raise unwritable(folder, error) from error
+        raise unwritable_error(folder, error) from error
 
 
 def check_free(folder: Path, names: Sequence[str], *, overwrite: bool, inputs: Iterable[Path] = ()) -> None:
@@ -215,7 +215,7 @@ def check_free(folder: Path, names: Sequence[str], *, overwrite: bool, inputs: I
         recorded = record.read_text(encoding="utf-8", errors="replace").splitlines() if record.exists() else []
         foreign = [name for name, digest in existing.items() if f"{digest}  {name}" not in recorded]
     except OSError as error:
-        raise unwritable(folder, error) from error
+        raise unwritable_error(folder, error) from error
     if foreign:
         raise OutputError(
             "a result would replace a file that bushfit did not write, or that was changed",
@@ -232,7 +232,7 @@ def check_free(folder: Path, names: Sequence[str], *, overwrite: bool, inputs: I
         )
 
 
-def unwritable(folder: Path, error: OSError) -> OutputError:
+def unwritable_error(folder: Path, error: OSError) -> OutputError:
     """Make the error for a results folder that cannot be written."""
     return OutputError(
         "the results cannot be written",

@@ -2,7 +2,7 @@
 
 import pandas as pd
 
-from bushfit.export.contract import Exported, ExportRequest
+from bushfit.export.contract import ExportedFiles, ExportRequest
 from bushfit.export.deck import NO_LOOPS
 from bushfit.model.result import Result
 from bushfit.reading.tablefile import to_csv, to_xlsx
@@ -14,15 +14,15 @@ from bushfit.version import __version__
 _OF_ALL = ("parameters", "provenance")
 
 
-def csv(request: ExportRequest) -> Exported:
+def csv(request: ExportRequest) -> ExportedFiles:
     """Export a model as CSV files, one for each table (predictions, parameters, provenance)."""
     written = {name: to_csv(table, decimal_comma=request.decimal_comma) for name, table in _tables(request).items()}
-    return Exported({f"{name.replace(' ', '_')}.csv": file for name, file in written.items()}, (NO_LOOPS,))
+    return ExportedFiles({f"{name.replace(' ', '_')}.csv": file for name, file in written.items()}, (NO_LOOPS,))
 
 
-def xlsx(request: ExportRequest) -> Exported:
+def xlsx(request: ExportRequest) -> ExportedFiles:
     """Export a model as an Excel workbook, `bushing.xlsx`, with a sheet for each table."""
-    return Exported({"bushing.xlsx": to_xlsx(_tables(request))}, (NO_LOOPS,))
+    return ExportedFiles({"bushing.xlsx": to_xlsx(_tables(request))}, (NO_LOOPS,))
 
 
 def _tables(request: ExportRequest) -> dict[str, pd.DataFrame]:

@@ -19,7 +19,7 @@ from bushfit.model.file import to_document
 from bushfit.reading.measurement import Loop, Sweep, loss_factor
 from bushfit.reading.resonance import ResonanceTest
 from bushfit.reading.tablefile import Form, ending, to_bytes
-from bushfit.simulation.measured import Simulated
+from bushfit.simulation.measured import SimulatedData
 from bushfit.templates import render_template
 from bushfit.units import CELSIUS
 
@@ -36,7 +36,7 @@ class SimulationDocument(TypedDict):
     files: list[str]
 
 
-def to_files(simulated: Simulated, form: Form = "csv", effects: Collection[str] = ()) -> dict[str, bytes]:
+def to_files(simulated: SimulatedData, form: Form = "csv", effects: Collection[str] = ()) -> dict[str, bytes]:
     """Convert a simulated campaign to the files of a laboratory.
 
     Args:

@@ -23,14 +23,14 @@ from bushfit.reading.runs import runs_of
 from bushfit.reading.tablefile import folder_name
 from bushfit.reduction.programme import split_record
 from bushfit.reduction.resonance import reduce_resonance
-from bushfit.simulation.undisturbed import Undisturbed, undisturbed
+from bushfit.simulation.exact import ExactTests, simulate_exact
 
 if TYPE_CHECKING:
     from numpy.random import Generator
 
 
 @dataclass(frozen=True, eq=False)
-class Simulated:
+class SimulatedData:
     """Simulated tests of a campaign with noise, and the true model, as `simulate` writes them to files.
 
     Args:
@@ -65,17 +65,17 @@ class Simulated:
         return Campaign(name, Path(name), bushing, *tests, specimens=self.specimens)
 
 
-def simulate(truth: Model, plan: SimulateSettings) -> Simulated:
+def simulate(truth: Model, plan: SimulateSettings) -> SimulatedData:
     """Simulate the tests of a campaign on the virtual rig, with noise; equal seeds give equal data.
 
     Args:
         truth: true model, including effects of the rig.
         plan: settings [simulate] with tests and noise; without tests, those of Garcia Tarrago et al. 2007.
     """
-    return measure(undisturbed(truth, plan), plan)
+    return measure(simulate_exact(truth, plan), plan)
 
 
-def measure(clean: Undisturbed, plan: SimulateSettings) -> Simulated:
+def measure(clean: ExactTests, plan: SimulateSettings) -> SimulatedData:
     """Add noise and repeats to tests that were simulated without errors.
 
     Args:
@@ -87,7 +87,7 @@ def measure(clean: Undisturbed, plan: SimulateSettings) -> Simulated:
 
     Notes:
         If a sweep does not reach its amplitudes, its stiffness is evaluated at the amplitude reached, as
-        `simulation.undisturbed` states. If the model depends on the order of the tests, the loops come first.
+        `simulation.exact` states. If the model depends on the order of the tests, the loops come first.
     """
     planned = [test for kind in (clean.loops, clean.sweeps, clean.resonances) for test, _ in kind]
     conditions = planned_session(clean.truth.bushing, planned, plan.repeats)[len(clean.loops) :]
@@ -100,7 +100,7 @@ def measure(clean: Undisturbed, plan: SimulateSettings) -> Simulated:
         noise = _force_noise(record, plan, random)
         name, force = f"loop_{loop.direction}_{number}", gains[loop] * record.force + noise
         noisy = replace(record, name=name, displacement=displacement, force=force)
-        loops.append(replace(noisy, temperature=loop.temperature, preload=loop.static))
+        loops.append(replace(noisy, temperature=loop.temperature, preload=loop.parsed_preload))
     named = zip(_test_names("sweep", [test for test, _ in clean.sweeps]), clean.sweeps, conditions, strict=False)
     sweeps = [
         _noisy_sweep(clean.truth, test, k, name, plan, random, conditions) for name, (test, k), conditions in named
@@ -118,7 +118,7 @@ def measure(clean: Undisturbed, plan: SimulateSettings) -> Simulated:
     tested = (*planned, *plan.validation)
     specimens = dict.fromkeys(test.direction for test in tested if isinstance(test.direction, Specimen))
     tests = tuple(loops), tuple(sweeps), tuple(resonances)
-    return Simulated(clean.truth, plan, *tests, tuple(specimens), tuple(records))
+    return SimulatedData(clean.truth, plan, *tests, tuple(specimens), tuple(records))
 
 
 def _test_names(kind: str, tests: Sequence[SimulatedTest]) -> list[str]:
@@ -164,7 +164,7 @@ def _noisy_sweep(
         ratios = np.exp(test.reached * np.sqrt(0.5) * (of_frequency + random.standard_normal(shape)))
         reached = level * ratios.ravel()
     if test.reached or truth.depends_on:
-        planned, place = RubberConditions(test.temperature, preload=test.static), test.direction
+        planned, place = RubberConditions(test.temperature, preload=test.parsed_preload), test.direction
         ratio = stiffness.ravel() / truth.stiffness(place, frequency, level, conditions=planned)
         amplitude = level if reached is None else reached
         stiffness = (ratio * truth.stiffness(place, frequency, amplitude, conditions=conditions)).reshape(shape)
@@ -184,7 +184,7 @@ def _noisy_sweep(
         reached=reached,
         stepped=test.stepped,
         temperature=test.temperature,
-        preload=test.static,
+        preload=test.parsed_preload,
     )
 
 

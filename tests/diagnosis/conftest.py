@@ -17,8 +17,8 @@ from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.problem import FitResult
 from bushfit.fitting.starts import start_values
 from bushfit.model.model import Model
+from bushfit.simulation.exact import ExactTests, simulate_exact
 from bushfit.simulation.measured import measure
-from bushfit.simulation.undisturbed import Undisturbed, undisturbed
 
 
 @pytest.fixture(scope="session")
@@ -31,7 +31,7 @@ def reference_shapes(root) -> dict[tuple[float, ...], float]:
 @pytest.fixture(scope="session")
 def measured(paper_model) -> Measured:
     """measured({"inertia": {"mass": 0.1}}, plan, seed): the paper's bushing with effects, on the rig."""
-    cleaned: dict[tuple[object, ...], Undisturbed] = {}
+    cleaned: dict[tuple[object, ...], ExactTests] = {}
 
     def campaign(effects: Effects | None = None, plan: SimulateSettings = PLAN, seed: int = 0) -> Campaign:
         model = paper_model
@@ -39,7 +39,7 @@ def measured(paper_model) -> Measured:
             model = model.with_effect(name, {f"{name}.{key}": value for key, value in values.items()})
         key = (tuple(model.values.items()), plan.loops, plan.sweeps)
         if key not in cleaned:
-            cleaned[key] = undisturbed(model, plan)
+            cleaned[key] = simulate_exact(model, plan)
         return measure(cleaned[key], replace(plan, seed=seed)).campaign()
 
     return campaign

@@ -16,7 +16,7 @@ from bushfit.fitting.problem import FitResult
 from bushfit.geometry import Direction
 from bushfit.model.model import Model
 from bushfit.reading.measurement import Loop, Sweep
-from bushfit.simulation.undisturbed import Undisturbed
+from bushfit.simulation.exact import ExactTests
 
 BOTH = [Direction.AXIAL, Direction.RADIAL]
 FREQUENCIES = tuple(float(f) for f in range(5, 156, 10))
@@ -43,7 +43,7 @@ SLIP = {"interface_slip": {"force": 6.0}}
 TWO = {"delay": {"tau": 1e-4}, "strain_stiffening": {"c3": 20.0}}
 
 
-def in_closed_form(truth: Model, plan: SimulateSettings) -> Undisturbed:
+def in_closed_form(truth: Model, plan: SimulateSettings) -> ExactTests:
     """What the closed form that fits use has of a model in its steady state: for effects that the rig cannot make."""
     phase = np.arange(1000) / 1000
     loops = []
@@ -56,7 +56,7 @@ def in_closed_form(truth: Model, plan: SimulateSettings) -> Undisturbed:
         (test, truth.stiffness(test.direction, np.array(test.frequencies), np.array(test.amplitudes)[:, None]))
         for test in plan.sweeps
     ]
-    return Undisturbed(truth, tuple(loops), tuple(sweeps))
+    return ExactTests(truth, tuple(loops), tuple(sweeps))
 
 
 def cut(sweep: Sweep, kept: Array) -> Sweep:

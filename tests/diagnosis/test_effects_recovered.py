@@ -19,8 +19,8 @@ from bushfit.fitting.preparation import MeasuredTest
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.model.model import Model
 from bushfit.model.result import Result
+from bushfit.simulation.exact import simulate_exact
 from bushfit.simulation.measured import measure
-from bushfit.simulation.undisturbed import undisturbed
 
 #: The rig steps a compliant mount in time with many more steps than any other.
 SLOW = {name for name in hideable() if "compliance" in name}
@@ -97,7 +97,7 @@ def begun(model: Model, campaign: Campaign) -> tuple[Model, list[MeasuredTest]]:
 def families(model: Model, truth: str, values: Mapping[str, float]) -> dict[str, FittedFamily]:
     made = model if truth == "paper" else model.with_effect(truth, {f"{truth}.{k}": v for k, v in values.items()})
     harmonic = any(effect.harmonic_only for effect in made.records)
-    clean = in_closed_form(made, PLAN) if harmonic else undisturbed(made, PLAN)
+    clean = in_closed_form(made, PLAN) if harmonic else simulate_exact(made, PLAN)
     fitted, _ = fit_families(*begun(model, measure(clean, PLAN).campaign()), NAMES, (), {})
     return {family.name: family for family in fitted}
 
@@ -124,7 +124,7 @@ def test_the_family_that_made_the_tests_is_the_best_and_known_to_be(paper_model,
 def test_the_interval_of_the_gain_grows_with_the_misfit(paper_model):
     """Noise that is stated as half makes residuals of twice the size, and four times the gain and its interval."""
     made = paper_model.with_effect("intrinsic_time", {"intrinsic_time.d": 3.0})
-    campaign = replace(measure(undisturbed(made, PLAN), PLAN).campaign(), loops=())
+    campaign = replace(measure(simulate_exact(made, PLAN), PLAN).campaign(), loops=())
     gains = []
     for noise in (2e-3, 1e-3):
         stated = replace(campaign, sweeps=tuple(replace(sweep, noise=noise) for sweep in campaign.sweeps))

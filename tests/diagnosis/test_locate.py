@@ -44,11 +44,11 @@ def test_trends(where_of, effects, direction, component, trend):
     assert min(excess) > 2.0
     where = one(found, direction, component)
     part = {"storage": "stiffness", "loss": "loss"}[component]
-    assert where.reading.startswith(f"measured {direction} {part} is up to ")
-    assert "% of |K| below the model" in where.reading
-    assert trend in where.reading
-    assert max(len(sentence.split()) for sentence in where.reading.split(". ")) <= 25
-    assert "at every amplitude" in where.reading
+    assert where.sentence.startswith(f"measured {direction} {part} is up to ")
+    assert "% of |K| below the model" in where.sentence
+    assert trend in where.sentence
+    assert max(len(sentence.split()) for sentence in where.sentence.split(". ")) <= 25
+    assert "at every amplitude" in where.sentence
     assert where.frequency[1] == pytest.approx(155.0)
     assert where.frequency[0] > 90.0
     assert where.amplitude == pytest.approx((LEVELS[0], LEVELS[-1]))
@@ -61,7 +61,7 @@ def test_trends(where_of, effects, direction, component, trend):
 def test_loops_alone(where_of, effects, reading):
     found = where_of(effects)
     assert {where.kind for where in found} == {"loop"}
-    assert all(reading in where.reading for where in found), found
+    assert all(reading in where.sentence for where in found), found
 
 
 @pytest.mark.parametrize(

@@ -72,7 +72,7 @@ def test_a_mistake_is_named_with_the_line_that_puts_it_right(truth, measured):
     before, after = diagnosis.calibration
     assert after < 1.02 < before - 0.02  # root mean squares over thousands of rows of loops, which agree
     assert diagnosis.result.model is diagnosis.before.model
-    assert not diagnosis.added
+    assert not diagnosis.has_added_effects
     assert any("fitted to the tests as they are" in warning for warning in map(str, diagnosis.result.warnings))
     mended = asked(campaign, adopt=tuple(truth.split()))
     assert mended.verdict == "consistent"
@@ -106,7 +106,7 @@ def test_a_mistake_in_every_explanation_is_reported_before_the_rest_is_decided(m
     diagnosis = asked(in_kilograms(measured({"sleeve_compliance": {"compliance": 2e-8}}, SHARED)))
     assert said(diagnosis) == "ambiguous kilogram_force + kilogram_force"
     assert diagnosis.summary.startswith("probable mistake in the record: the forces of loop_axial_1 and loop_")
-    assert not diagnosis.added
+    assert not diagnosis.has_added_effects
 
 
 def test_of_the_corrections_of_the_same_tests_those_far_behind_leave_room_for_others(measured, monkeypatch):

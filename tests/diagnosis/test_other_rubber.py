@@ -20,8 +20,8 @@ from bushfit.geometry import Direction
 from bushfit.model.file import from_document, to_document
 from bushfit.prediction.stiffness import predict
 from bushfit.reading.measurement import Loop
+from bushfit.simulation.exact import ExactTests
 from bushfit.simulation.measured import measure
-from bushfit.simulation.undisturbed import Undisturbed
 
 FREQUENCIES = (5.0, 8.0, 12.0, 18.0, 25.0, 35.0, 50.0, 65.0, 80.0, 95.0, 110.0, 125.0, 140.0, 150.0)
 PLAN = SimulateSettings(
@@ -84,7 +84,7 @@ def rubber(paper_model):
             )
             for test in PLAN.sweeps
         ]
-        return measure(Undisturbed(paper_model, tuple(loops), tuple(sweeps)), replace(PLAN, seed=seed)).campaign()
+        return measure(ExactTests(paper_model, tuple(loops), tuple(sweeps)), replace(PLAN, seed=seed)).campaign()
 
     return campaign
 

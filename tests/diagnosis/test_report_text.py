@@ -205,7 +205,7 @@ def test_other_explanations_widen_the_uncertainty_by_their_probability(paper_mod
     covariance = Covariance(("mu",), np.array([[1e8]]))
     other = paper_model.with_values({"mu": paper_model.values["mu"] + 1e4})
     odds = Odds(0.4, (("one", 0.7), ("other", 0.3)), (None, (other, covariance)))
-    widened = odds.averaged(Result(paper_model, ("mu",), covariance)).covariance
+    widened = odds.widen(Result(paper_model, ("mu",), covariance)).covariance
     assert widened.stderr("mu") == pytest.approx(1e4 * np.sqrt(1.0 + 0.6 * 0.3))
 
 

@@ -34,8 +34,8 @@ from bushfit.effects import BASE
 from bushfit.geometry import Bushing, Direction
 from bushfit.model.model import Model
 from bushfit.reading.preload import Preload
+from bushfit.simulation.exact import simulate_exact
 from bushfit.simulation.measured import measure
-from bushfit.simulation.undisturbed import undisturbed
 
 #: The axial level of 0.2 mm.
 level_too_stiff = off(0, 1.05, amplitude=LEVELS[1])
@@ -78,7 +78,7 @@ def test_temperature_is_named_even_if_the_tests_determine_one_combination_of_its
             SimulatedSweep(Direction.AXIAL, levels, FREQUENCIES, temperature=kelvin) for kelvin in degrees if levels
         ),
     )
-    diagnosis = asked(measure(undisturbed(warm, plan), replace(plan, seed=seed)).campaign())
+    diagnosis = asked(measure(simulate_exact(warm, plan), replace(plan, seed=seed)).campaign())
     assert "temperature" in names(diagnosis)
 
 
@@ -108,7 +108,7 @@ def test_what_one_place_alone_shows_is_to_be_measured_again(measured, tamper, pl
     assert said(diagnosis) == "unexplained "
     assert diagnosis.after is diagnosis.before
     assert place in diagnosis.summary
-    assert re.match(rf"{re.escape(place)}: a deviation of [\d.]+ % from all other tests", diagnosis.where[0].reading)
+    assert re.match(rf"{re.escape(place)}: a deviation of [\d.]+ % from all other tests", diagnosis.where[0].sentence)
     assert diagnosis.next_test == f"measure again: {place}"
     assert diagnosis.odds.labels[0] == (f"fault: {place}",)
 
@@ -173,7 +173,7 @@ def test_a_radial_stiffness_off_the_formula_is_not_blamed_on_the_rig(reference_s
     for a rig that gives way to do the same."""
     model = replace(paper_model, bushing=Bushing("shape", *(1e-3 * length for length in shape)))
     ratio = reference_shapes[shape] / model.bushing.stiffness_per_modulus(Direction.RADIAL)
-    campaign = measure(undisturbed(model, PLAN, steps_per_cycle=512), SHARED).campaign()
+    campaign = measure(simulate_exact(model, PLAN, steps_per_cycle=512), SHARED).campaign()
     campaign = changed(campaign, 1, ratio)
     diagnosis = asked(campaign)
     (found,) = diagnosis.effects

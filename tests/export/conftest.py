@@ -9,7 +9,7 @@ import pytest
 from fmus import Running, request_of
 from readers import HASH
 
-from bushfit.export.contract import Exported, ExportRequest
+from bushfit.export.contract import ExportedFiles, ExportRequest
 from bushfit.export.fmu import export
 from bushfit.geometry import Direction
 from bushfit.model.result import Result
@@ -50,7 +50,7 @@ def named(export_request) -> Callable[[str], ExportRequest]:
 
 
 @pytest.fixture(scope="session")
-def exported(paper_model) -> Exported:
+def exported(paper_model) -> ExportedFiles:
     """The paper's bushing in three directions."""
     return export(request_of(paper_model))
 

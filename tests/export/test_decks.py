@@ -15,7 +15,7 @@ from bushfit.effects.contract import Array
 from bushfit.effects.history import History
 from bushfit.errors import ModelError
 from bushfit.export import abaqus, adams, nastran, prony
-from bushfit.export.contract import MM_T_S_N, Exported, ExportRequest, UnitSystem
+from bushfit.export.contract import MM_T_S_N, ExportedFiles, ExportRequest, UnitSystem
 from bushfit.export.deck import DOFS
 from bushfit.geometry import Direction, Specimen
 from bushfit.model.model import Model
@@ -29,10 +29,10 @@ MODEL = 2e-4
 DIGITS, ALONG = 5e-5, 2e-9
 SYSTEMS = ["N, s, t, mm", "m kg s N", "mm kg ms kN", "in lbf*s^2/in s lbf"]
 ENDS = ("FX", "FY", "FZ", "TX", "TY", "TZ")
-WRITERS: list[Callable[[ExportRequest], Exported]] = [nastran.export, abaqus.export, adams.export]
+WRITERS: list[Callable[[ExportRequest], ExportedFiles]] = [nastran.export, abaqus.export, adams.export]
 
 
-def read(name: str, export_request: ExportRequest, folder: Path) -> tuple[Exported, Curves]:
+def read(name: str, export_request: ExportRequest, folder: Path) -> tuple[ExportedFiles, Curves]:
     """The export of a format, and what its reader finds in it."""
     if name == "abaqus":
         exported = abaqus.export(export_request)

@@ -53,7 +53,7 @@ def test_a_tie_holds_in_values_errors_and_derivatives(rig):
     assert list(tied.ties) == ["m"]
     assert "m" not in tied.fitted
     slopes = np.array([0.18, 1e3 * np.exp(alpha)])
-    free = tied.covariance.restricted(["mu", "alpha"]).matrix
+    free = tied.covariance.select(["mu", "alpha"]).matrix
     assert tied.covariance.stderr("m") == pytest.approx(float(np.sqrt(slopes @ free @ slopes)))
     tests = PreparedCampaign.from_campaign(rig(3)).data_sets
     above, below = (residual(tied.model.with_values({"mu": mu * np.exp(s)}), tests) for s in (1e-5, -1e-5))

@@ -16,9 +16,9 @@ from bushfit.inspection.opening import inspect_file
 from bushfit.inspection.record import Inspection, campaign_tables
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.reading.tablefile import to_csv
+from bushfit.simulation.exact import ExactTests, simulate_exact
 from bushfit.simulation.files import raw_loop_table, raw_sweep_table
 from bushfit.simulation.measured import measure, simulate
-from bushfit.simulation.undisturbed import Undisturbed, undisturbed
 
 CHANNELS = ("time", "displacement", "force")
 NOISE = {
@@ -44,8 +44,8 @@ def look(folder: Path, test: Loop | Sweep, name: str = "axial.csv", above: str =
 
 
 @pytest.fixture(scope="module")
-def clean(paper_model) -> Undisturbed:
-    return undisturbed(paper_model, plan(), steps_per_cycle=256)
+def clean(paper_model) -> ExactTests:
+    return simulate_exact(paper_model, plan(), steps_per_cycle=256)
 
 
 @pytest.fixture
@@ -61,7 +61,7 @@ def sweep(clean) -> Sweep:
 def test_a_triangle_in_torsion_about_a_mean_is_described(tmp_path, paper_model):
     """The references of exports contain the same facts on loops with a sine."""
     test = SimulatedLoop(Direction.TORSION, 0.02, 0.1, cycles=2, waveform="triangle")
-    made = measure(undisturbed(paper_model, SimulateSettings(loops=(test,))), SimulateSettings(force_noise=1e-3))
+    made = measure(simulate_exact(paper_model, SimulateSettings(loops=(test,))), SimulateSettings(force_noise=1e-3))
     (loop,) = made.loops
     seen = look(tmp_path, replace(loop, force=loop.force + 0.02 * loop.force.max()), "x.csv")
     assert (seen.direction.is_rotation, seen.facts["frequency"], seen.odd) == (True, "0.1 Hz, a triangle", ())

@@ -97,7 +97,7 @@ def test_intervals_are_as_wide_as_an_estimated_variance_needs():
     summed = 2.0 * 13.0**2 / (4.0**2 * 2.0 / 3.0 + 9.0**2 * 2.0 / 5.0)
     expected = [t.ppf(0.975, freedom) * np.sqrt(variance) for freedom, variance in ((3, 4), (5, 9), (summed, 13))]
     np.testing.assert_allclose(found, expected)
-    np.testing.assert_allclose(covariance.restricted(["m"]).half_width(np.ones((1, 1))), found[1:2])
+    np.testing.assert_allclose(covariance.select(["m"]).half_width(np.ones((1, 1))), found[1:2])
     known = Covariance(("mu", "m"), one + other)
     np.testing.assert_allclose(known.half_width(np.eye(2)), [Z95 * 2.0, Z95 * 3.0], rtol=1e-4)
 

@@ -25,8 +25,8 @@ from bushfit.planning.contract import Aim, Knowledge, Noise, PlanRequest, Test, 
 from bushfit.planning.information import CandidateGrid, ModelInformation, relative_slopes, rival_chi_squares
 from bushfit.planning.plan import Plan, plan
 from bushfit.planning.search import PlanSearch
+from bushfit.simulation.exact import simulate_exact
 from bushfit.simulation.measured import measure
-from bushfit.simulation.undisturbed import undisturbed
 from tests.fits import residual, solve
 
 AXIAL, RADIAL = Direction.AXIAL, Direction.RADIAL
@@ -197,7 +197,7 @@ def test_simulated_campaigns_show_the_errors_promised(known):
     vague = replace(known, covariance=100.0 * known.covariance, noise=Noise())
     planned = plan(vague, PlanRequest("predictions", 0.7, RIG, (AXIAL,), WANTED, names))
     settings = simulation_settings(planned.tests, vague.noise)
-    clean = undisturbed(truth, settings)
+    clean = simulate_exact(truth, settings)
     found = []
     for seed in range(20):
         campaign = replace(measure(clean, replace(settings, seed=seed)).campaign(), rig=RIG)

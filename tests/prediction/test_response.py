@@ -9,7 +9,7 @@ from scipy.signal import chirp
 from bushfit.commands.respond import respond
 from bushfit.effects.contract import Array
 from bushfit.effects.history import History
-from bushfit.effects.unnamed import Patch, Unnamed
+from bushfit.effects.unnamed import Patch, SmoothCorrection
 from bushfit.errors import MeasurementError
 from bushfit.geometry import Direction
 from bushfit.model.covariance import Covariance
@@ -101,7 +101,7 @@ def test_a_steady_state_is_that_of_the_closed_form(paper_model, corrected):
     if corrected:
         patch = Patch(("radial",), (5.0, 20.0), (0.01, 0.02), (0.04, 0.05), (0.02, 0.01), (0.001,) * 2, (0.001,) * 2)
         effects = [*paper_model.effects, "unnamed"]
-        unnamed = Unnamed(0.05, (1.0, 1.0), (patch,))
+        unnamed = SmoothCorrection(0.05, (1.0, 1.0), (patch,))
         paper_model = paper_model.with_defaults(paper_model.bushing, effects, paper_model.values, unnamed)
     motion = amplitude * np.sin(2.0 * np.pi * 10.0 * np.arange(400 * cycles) / 4000.0)
     late = paper_model.with_effect("delay", {"delay.tau": 1e-4})

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bushfit.effects.unnamed import Patch, Unnamed
+from bushfit.effects.unnamed import Patch, SmoothCorrection
 from bushfit.errors import ModelError
 from bushfit.geometry import Direction
 from bushfit.model.covariance import Covariance
@@ -95,7 +95,7 @@ def test_about_a_preload_it_is_that_of_the_rig_with_the_whole_elastic_law(paper_
 
 def test_a_smooth_correction_changes_the_curve_as_in_a_sine(paper_model):
     node = (RATE / 4e-3,), (1e-3 * paper_model.unit_strain(Direction.AXIAL),)
-    data = Unnamed(0.1, (1.0, 1.0), (Patch(("axial",), *node, (0.1,), (0.0,), (0.01,), (0.01,)),))
+    data = SmoothCorrection(0.1, (1.0, 1.0), (Patch(("axial",), *node, (0.1,), (0.0,), (0.01,), (0.01,)),))
     effects = (*paper_model.effects, "unnamed")
     corrected = Model.with_defaults(paper_model.bushing, effects, paper_model.values, data)
     curve, plain = (static_curve(Result(model), Direction.AXIAL, 1e-3, RATE) for model in (corrected, paper_model))

@@ -18,8 +18,8 @@ from bushfit.prediction.resonance import predict_resonance
 from bushfit.prediction.stiffness import predict
 from bushfit.reading.measurement import Sweep
 from bushfit.report.tables import predicted_resonance_table, prediction_table
+from bushfit.simulation.exact import simulate_exact
 from bushfit.simulation.measured import measure
-from bushfit.simulation.undisturbed import undisturbed
 
 #: A grid, not in order [Hz] and [m].
 FREQUENCIES = np.array([155.0, 5.0, 55.0])
@@ -38,7 +38,7 @@ EXCLUDES = "The band excludes the error of the"
 def test_bands_of_an_open_model_are_narrow_where_it_was_measured_and_only_there(paper_model, amplitudes, frequencies):
     """The direction that such sweeps leave wholly open cancels where the stiffness does not depend on it."""
     plan = SimulateSettings(repeats=3, noise=5e-3, sweeps=(SimulatedSweep(Direction.AXIAL, amplitudes, frequencies),))
-    result = joint_fit(measure(undisturbed(paper_model, plan), plan).campaign())
+    result = joint_fit(measure(simulate_exact(paper_model, plan), plan).campaign())
 
     def width(frequency: float, amplitude: float) -> float:
         band = predict(result, Direction.AXIAL, [frequency], [amplitude]).stiffness

@@ -22,8 +22,8 @@ from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.geometry import Bushing, Direction
 from bushfit.model.model import Model
 from bushfit.reading.measurement import Loop, Sweep
-from bushfit.simulation.measured import Simulated, measure
-from bushfit.simulation.undisturbed import PAPER_FREQUENCIES, undisturbed
+from bushfit.simulation.exact import PAPER_FREQUENCIES, simulate_exact
+from bushfit.simulation.measured import SimulatedData, measure
 
 BOTH = (Direction.AXIAL, Direction.RADIAL)
 #: Least and largest size of what stays visible, relative to |K| or half a loop's force range: hardly seen to plain.
@@ -42,7 +42,7 @@ class _OutOfReachError(Exception):
     """No amount of an effect shows at a size in range."""
 
 
-def hidden_campaign(seed: int, hidden: Sequence[str] = (), visible: tuple[float, float] = _VISIBLE) -> Simulated:
+def hidden_campaign(seed: int, hidden: Sequence[str] = (), visible: tuple[float, float] = _VISIBLE) -> SimulatedData:
     """One simulated campaign, with its true model in `truth`; the same seed makes the same.
 
     Args:
@@ -61,7 +61,7 @@ def hidden_campaign(seed: int, hidden: Sequence[str] = (), visible: tuple[float,
             for name in hidden:
                 wanted = float(np.exp(random.uniform(*np.log(visible))))
                 model = model.with_effect(name, _sized(plain, get_effect(name), wanted, plan, random, visible))
-            return measure(undisturbed(model, plan, steps_per_cycle=STEPS), plan)
+            return measure(simulate_exact(model, plan, steps_per_cycle=STEPS), plan)
     raise RuntimeError(f"no visible size of {', '.join(hidden)} was found for seed {seed}")
 
 

@@ -21,7 +21,7 @@ from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.planning.campaign import simulation_settings
 from bushfit.planning.contract import Noise, Test
 from bushfit.planning.search import RIVALS_APART
-from bushfit.simulation.measured import Simulated, simulate
+from bushfit.simulation.measured import SimulatedData, simulate
 
 #: Effects that are hidden.
 HIDDEN = (
@@ -87,7 +87,7 @@ def planned_session(campaign: Campaign, hours: float) -> tuple[Test, ...]:
     return planned.tests if rivals and rivals["planned"] >= RIVALS_APART else ()
 
 
-def with_session(campaign: Campaign, hidden: Simulated, tests: tuple[Test, ...]) -> Campaign:
+def with_session(campaign: Campaign, hidden: SimulatedData, tests: tuple[Test, ...]) -> Campaign:
     """A campaign with further tests of what is hidden in it, on the same rig.
 
     What depends on the order of the tests is measured anew as a whole, all in one session.

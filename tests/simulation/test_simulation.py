@@ -10,8 +10,8 @@ from bushfit.effects import BASE, LIBRARY, History, get_effect, qualified_name
 from bushfit.geometry import Direction, Specimen
 from bushfit.model.model import Model
 from bushfit.simulation import rig
+from bushfit.simulation.exact import ExactTests, simulate_exact
 from bushfit.simulation.measured import measure
-from bushfit.simulation.undisturbed import Undisturbed, undisturbed
 
 LOOP = SimulatedLoop(Direction.AXIAL, 1e-3, 0.1, cycles=2)
 SWEEP = SimulatedSweep(Direction.AXIAL, (1e-4, 5e-4), (5.0, 50.0, 155.0))
@@ -22,13 +22,13 @@ STRAIN_SWEEP = SimulatedSweep(COUPON, STRAINS, (1.0, 10.0, 100.0), stepped="ampl
 
 
 @pytest.fixture(scope="module")
-def clean(paper_model) -> Undisturbed:
-    return undisturbed(paper_model, PLAN)
+def clean(paper_model) -> ExactTests:
+    return simulate_exact(paper_model, PLAN)
 
 
 @pytest.fixture(scope="module")
-def coupon(paper_model) -> Undisturbed:
-    return undisturbed(Model(None, BASE, paper_model.values), SimulateSettings(sweeps=(STRAIN_SWEEP,)))
+def coupon(paper_model) -> ExactTests:
+    return simulate_exact(Model(None, BASE, paper_model.values), SimulateSettings(sweeps=(STRAIN_SWEEP,)))
 
 
 @pytest.mark.parametrize(
@@ -42,7 +42,7 @@ def test_a_small_loop_is_that_of_the_closed_form_with_any_effect(paper_model, na
     if not effect.replaces:
         model = model.with_values({qualified_name(effect, effect.amount): effect.amount.value_at_share(0.1)})
     small = SimulatedLoop(Direction.AXIAL, 2e-6, 1.0, cycles=1)
-    ((_, record),) = undisturbed(model, SimulateSettings(loops=(small,))).loops
+    ((_, record),) = simulate_exact(model, SimulateSettings(loops=(small,))).loops
     closed = model.stiffness(Direction.AXIAL, 1.0, 2e-6, kind="loop")
     assert rig.lock_in(record, 1.0) == pytest.approx(closed, rel=5e-4)
     if not model.structure.modifiers:  # whose loops have no motion of a larger amplitude before

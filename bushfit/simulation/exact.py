@@ -56,7 +56,7 @@ _SWELL_CYCLES, _SWELL_TO = 100, 0.3
 
 
 @dataclass(frozen=True, eq=False)
-class Undisturbed:
+class ExactTests:
     """Tests of a known model without noise and random errors, which `measure` adds.
 
     Args:
@@ -74,7 +74,7 @@ class Undisturbed:
     validation: tuple[tuple[SimulatedRecord, Loop], ...] = ()
 
 
-def undisturbed(truth: Model, plan: SimulateSettings, *, steps_per_cycle: int = rig.STEPS_PER_CYCLE) -> Undisturbed:
+def simulate_exact(truth: Model, plan: SimulateSettings, *, steps_per_cycle: int = rig.STEPS_PER_CYCLE) -> ExactTests:
     """Simulate the tests of a campaign without noise; this is the slow part of a simulation.
 
     Args:
@@ -100,7 +100,7 @@ def undisturbed(truth: Model, plan: SimulateSettings, *, steps_per_cycle: int = 
             )
         loops, sweeps = PAPER_LOOPS, PAPER_SWEEPS
     conditions = planned_session(truth.bushing, [*loops, *sweeps, *resonances], plan.repeats)
-    return Undisturbed(
+    return ExactTests(
         truth,
         tuple(
             (test, _clean_loop(truth, test, conditions.select(0)))
@@ -233,7 +233,7 @@ def _clean_sweep(truth: Model, test: SimulatedSweep, steps_per_cycle: int) -> Ar
     A level is a constant amplitude or frequency, at which the sweep steps through the other quantity.
     """
     points = (values.ravel() for values in test.points)
-    conditions = RubberConditions(test.temperature, preload=test.static)
+    conditions = RubberConditions(test.temperature, preload=test.parsed_preload)
     stiffness = rig.dynamic_stiffness(
         truth, test.direction, *points, steps_per_cycle=steps_per_cycle, conditions=conditions
     )
