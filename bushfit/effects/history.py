@@ -35,7 +35,7 @@ class History:
             et al. 2007, Eq. 3, which is of first order. A steady state has neither error.
 
     >>> cycle = History.steady(np.array([0.0, 1.0, 0.0, -1.0]), 5.0)
-    >>> cycle.step, cycle.amplitude, cycle.turning.strides
+    >>> cycle.step, cycle.amplitude, cycle.strokes.strides
     (0.05, array([1.]), array([-2.,  2.]))
     """
 

@@ -209,7 +209,7 @@ def first_harmonic(values: Values, below: ForceBelow, displacement: History, set
     >>> patch = Patch(("axial",), (5.0,), (0.01,), (0.1,), (0.0,), (0.0,), (0.0,))
     >>> amplitude = 0.01 / geometry.unit_strain(loop.bushing, loop.direction)
     >>> motion = History.steady(amplitude * np.array([0.0, 1.0, 0.0, -1.0]), 5.0)
-    >>> test = replace(loop, unnamed=Unnamed(0.1, (1.0, 1.0), (patch,)))
+    >>> test = replace(loop, unnamed=SmoothCorrection(0.1, (1.0, 1.0), (patch,)))
     >>> force = first_harmonic({}, lambda history: 1e5 * history.value, motion, test)
     >>> round(float(force[1]) / (1e5 * amplitude), 6)
     1.1
