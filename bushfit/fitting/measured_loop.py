@@ -213,7 +213,12 @@ class MeasuredLoop(MeasuredBase):
         return self.whiten((response - self.measured_force) * self._per_noise)
 
     def residual_change(self, change: Array, model: Model, added: Array | float = 0.0) -> Array:
-        """Change of the whitened residuals, (..., size), due to a change of the stiffness; see `MeasuredBase`."""
+        """Change of the whitened residuals, (..., size), due to a change of the stiffness; see `MeasuredBase`.
+
+        Args:
+            change: change of the stiffness in the first harmonic, complex (..., 1) [N/m or N m/rad].
+            model, added: not used for a loop.
+        """
         return np.concatenate((change.real, change.imag), axis=-1) @ self._stiffness_changes
 
     @cached_property

@@ -198,7 +198,15 @@ class MeasuredSweep(MeasuredBase):
         return self.whiten(self.deviation(response))
 
     def residual_change(self, change: Array, model: Model, added: Array | float = 0.0) -> Array:
-        """Change of the whitened residuals, (..., 2 n), due to a change of the stiffness; see `MeasuredBase`."""
+        """Change of the whitened residuals due to a change of the stiffness; see `MeasuredBase`.
+
+        Args:
+            change, added: change of the stiffness, and added stiffness, at each point, complex (..., n).
+            model: model whose stiffness changes.
+
+        Returns:
+            Changes, (..., 2 n): of n gains, then of n phases.
+        """
         stiffness = self.response(model) + added
         relative = change / stiffness
         if self.residuals == "complex":
@@ -289,6 +297,9 @@ class MeasuredSweep(MeasuredBase):
 
     def noise_sensitivity(self, influence: Array) -> dict[Hashable, Array]:
         """Change of the weights of the residuals in k estimates by an error of the noise; see `MeasuredBase`.
+
+        Returns:
+            Changes of `influence`, (k, 2 n), by identifier of the noise variance.
 
         Notes:
             Within a run the derivatives of V are I with respect to s^2 and 1 1^T with respect to t^2; whitened, W^2
