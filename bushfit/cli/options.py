@@ -26,10 +26,10 @@ Record = tuple[str, Callable[[click.Context, dict[str, Any]], Any]]
 
 
 class Option(click.Option):
-    """Option of a command, with its heading in the help text.
+    """Option of a command, with the heading under which the help text lists the option.
 
-    An option of a group is not passed to the command's function by itself: `record` names the argument that collects
-    the values of the group, and the function that makes it from these values.
+    If the option has a `record` (see `option_group`), its value is not passed to the command's function. The record
+    names one argument for the values of all options of the group, and a function that makes the argument from them.
     """
 
     heading: str | None = None

@@ -57,10 +57,10 @@ class DiagnosisOutput:
 
     @property
     def adoptable_names(self) -> list[str]:
-        """Effects and mistakes to adopt if tests confirm them; empty if it is useless to adopt them.
+        """Names of the effects and mistakes that --adopt may add to the model, if further tests confirm them.
 
-        It is useless if the named effects are certain and in the model already, or if a part of the tests has to be
-        measured again first.
+        Empty if the named effects are certain and in the model already, or if a part of the tests has to be measured
+        again first.
         """
         causes = [entry for entry in self.diagnosis.effects if entry.name != UNNAMED]
         is_open = any(level_of(entry.name) in ("record", "unresolved") for entry in causes)

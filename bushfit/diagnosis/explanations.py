@@ -38,7 +38,7 @@ class Signature:
 
     @property
     def whole(self) -> Array:
-        """Changes of all n residuals per unit amount of each column, (c, n)."""
+        """Columns over all n residuals, (c, n): `columns` in the covered rows, and 0 in the other rows."""
         if self.covered_rows is None:
             return self.columns
         rows, count = self.covered_rows

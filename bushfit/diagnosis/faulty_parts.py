@@ -81,10 +81,11 @@ class FaultyPart(Explanation):
         return by_family.get(self.family, ("shift", "gain", "points"))
 
     def in_form(self, form: Form) -> FaultyPart:
-        """Return this part with errors of another form: a common gain error, or one error for each point.
+        """Return this part with another assumption on the errors of its points.
 
         Args:
-            form: "shift", a common gain and phase error, "gain", or "points", one column for each residual.
+            form: "shift": all points have the same error of gain and phase; "gain": the same error of gain; "points":
+                each point has an independent error.
         """
         assert self.signature is not None
         signature = self.signature

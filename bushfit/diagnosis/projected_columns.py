@@ -109,11 +109,13 @@ class CompoundDeviation:
         return np.maximum(values, 0.0), vectors
 
     def inner(self, rows: RigRows, combinations: Array) -> Array:
-        """Inner products of the q modes with other residual changes.
+        """Inner products of the q modes of the deviation with other changes of the residuals.
+
+        The products are weighted by the inverse covariance of the residuals, as in `RigRows.inner`.
 
         Args:
-            rows: m changes of the residuals.
-            combinations: indices of c assumed sizes of the rig's errors, (c,).
+            rows: m changes of the residuals, such as their derivatives with respect to parameters.
+            combinations: indices of c combinations of sizes of the rig's errors, (c,).
 
         Returns:
             Products, (c, q, m).

@@ -244,7 +244,7 @@ class MistakeScreening:
     def _test_products(
         self, index: int, data_set: MeasuredTest, mistake: Mistake | None, bushing: Bushing | None
     ) -> Array:
-        """Normal equations of one test: inner products of the stiffness per unit of mu, m and sigma_fmax, and measured.
+        """Normal equations by which one test contributes to the fit of mu, m and sigma_fmax in `misfit`.
 
         Args:
             index: index of the test, loops before sweeps.
@@ -253,8 +253,8 @@ class MistakeScreening:
             bushing: bushing with its dimensions, corrected if the mistake is in them; None without a bushing.
 
         Returns:
-            Matrices of these four rows and columns (mu, m, sigma_fmax, measured) for g pairs of alpha and eps_half,
-            (g, 4, 4).
+            Inner products over the points of the test, for g pairs of alpha and eps_half, (g, 4, 4), of four rows: the
+            stiffness per unit of mu, of m and of sigma_fmax, and the measured stiffness.
         """
         key = (index, mistake.name if mistake else "", bushing)
         if key not in self._products:

@@ -113,7 +113,7 @@ class DiagnosisWriter:
         rest = [part.name for part in first.faulty_parts] + [LEVELS] * first.best.has_level_errors
         rest += [f"{NAMELESS}, {gap.sentence}" if gap else NAMELESS] * bool(gap or first.unnamed)
         faulty = first.best if first.faulty_parts else None
-        return self._build(closing, summary, entries, rest, places=faulty, next_test=advice)
+        return self._build(closing, summary, entries, rest, at_fault=faulty, next_test=advice)
 
     def _revised_finding(self, diagnosis: Diagnosis, holdout: HoldOut | None) -> Finding | None:
         """New verdict if intervals or held-out tests contradict the named effects; else None.
@@ -141,7 +141,7 @@ class DiagnosisWriter:
             summary += "; correct this first: the tests do not decide yet what else is missing"
         after = without_assumed_gain_errors(best.state.plain, self.search.data)
         closing = ClosedGap(base, holdout=hold_out(base, after, self.search.data.bounds))
-        diagnosis = self._build(closing, summary, self._record_entries(first), places=best, next_test=advice)
+        diagnosis = self._build(closing, summary, self._record_entries(first), at_fault=best, next_test=advice)
         warning = Caveat("mistaken_record", f"fitted to the tests as they are; probable mistake: {mistake.sentence}")
         result = replace(diagnosis.result, warnings=(*diagnosis.result.warnings, warning))
         return replace(diagnosis, after=after, remainder=find_regions(after), result=result)
@@ -161,7 +161,7 @@ class DiagnosisWriter:
             entries = [NamedCause(name, why, rivals) for name in leader.names]
         faulty = next((composition.best for composition in reported if composition.faulty_parts), None)
         advice = self._deciding_advice(leader)
-        return self._build(closing, "; ".join(sentences), entries, places=faulty, next_test=advice)
+        return self._build(closing, "; ".join(sentences), entries, at_fault=faulty, next_test=advice)
 
     def _nameless_diagnosis(self, first: Composition, closing: ClosedGap) -> Diagnosis:
         """Diagnosis of a gap that no known effect explains: a smooth correction, or the tests to measure again."""
@@ -188,9 +188,9 @@ class DiagnosisWriter:
             sentences = [*dict.fromkeys(["no known effect explains the gap", *causes_text(candidates, self.finding)])]
             sentences += [f"the gap is largest at {at_fault}"] if at_fault else []
         entries = [NamedCause(UNNAMED, gap.evidence, tuple(candidates))] if gap else []
-        places = first.best if is_faulty else None
+        faulty = first.best if is_faulty else None
         reported: Verdict = "described" if gap else "unexplained"
-        return self._build(closing, "; ".join(sentences), entries, verdict=reported, places=places, next_test=advice)
+        return self._build(closing, "; ".join(sentences), entries, verdict=reported, at_fault=faulty, next_test=advice)
 
     @property
     def _candidates(self) -> list[Composition]:
@@ -247,7 +247,7 @@ class DiagnosisWriter:
         remainder: Sequence[str] = (),
         *,
         verdict: Verdict | None = None,
-        places: Hypothesis | None = None,
+        at_fault: Hypothesis | None = None,
         next_test: str = "",
     ) -> Diagnosis:
         """Build the diagnosis with regions, hold-out, candidates and the model to use.
@@ -258,14 +258,14 @@ class DiagnosisWriter:
             entries: named effects or mistakes.
             remainder: names of the parts of the gap that the entries do not explain; empty if they explain it all.
             verdict: verdict in one word; None for the verdict of `finding`.
-            places: hypothesis whose faulty parts of the tests are reported; None without any.
+            at_fault: hypothesis whose faulty parts of the tests are reported; None without any.
             next_test: advice on the next test; "" for the usual confirmation of the first entry.
         """
         search, base, after, gap = self.search, self.base, closing.final_fit, closing.gap
         bounds, regions = search.data.bounds, find_regions(base)
-        faulty_parts = places.faulty_parts if places else ()
-        at_fault = [part.region(base.residual, places.change) for part in faulty_parts] if places else []
-        where = tuple(sorted((*at_fault, *regions), key=lambda region: -region.excess))
+        faulty_parts = at_fault.faulty_parts if at_fault else ()
+        faults = [part.region(base.residual, at_fault.change) for part in faulty_parts] if at_fault else []
+        where = tuple(sorted((*faults, *regions), key=lambda region: -region.excess))
         if faulty_parts:
             next_test = MEASURE_AGAIN + faulty_parts[0].name
         elif not next_test and entries:
@@ -285,7 +285,7 @@ class DiagnosisWriter:
         odds = explanation_odds(self.finding)
         result = with_alternatives(odds.widen(fitted), self.hypotheses, base, search.settings.tolerance)
         amounts = [format_amount(entry.name, result) for entry in entries]
-        leads = "" if places else leads_text(self._candidates, self.finding)  # else measure again first
+        leads = "" if at_fault else leads_text(self._candidates, self.finding)  # else measure again first
         rest = [f"the rest: {join_names(remainder)}"] if remainder else []
         return Diagnosis(
             verdict or self.finding.verdict,

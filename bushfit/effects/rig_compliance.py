@@ -183,11 +183,14 @@ class _AndersonMixing:
         self._before: tuple[Array, Array] | None = None
 
     def step(self, estimate: Array, change: Array) -> Array:
-        """Change of the force to apply next, improved by the previous iterations.
+        """Improve the change of the force that the fixed-point iteration proposes, by the previous iterations.
 
         Args:
             estimate: force of this iteration [N], (..., n).
-            change: change that the fixed-point iteration proposes for it [N], (..., n).
+            change: proposed change of this force [N], (..., n).
+
+        Returns:
+            Change to apply [N], (..., n).
         """
         before, self._before = self._before, (estimate, change)
         if before is None:

@@ -279,9 +279,8 @@ class MeasuredSweep(MeasuredBase):
     def whiten(self, difference: Array) -> Array:
         """Divide deviations by their noise and remove the correlation that errors shared by points cause.
 
-        With a model error, the errors shared by runs and levels are not part of this noise: the error of the model
-        differs from level to level as well and is larger, so the smaller error of the rig must not reduce the weight
-        of a level.
+        With a model error, the errors shared by runs and levels are not part of this noise: the model error is larger
+        and differs between levels too, so the rig's smaller error must not reduce the weight of a level.
 
         Args:
             difference: relative differences in magnitude + i differences in phase [rad], complex (..., n).
@@ -370,10 +369,7 @@ class MeasuredSweep(MeasuredBase):
         return rows.reshape(2, -1) / self.random_noise
 
     def distance(self, model: Model) -> Array:
-        """Distance of each point from the model in units of noise, (n,): root mean square of gain and phase deviation.
-
-        The likeliest error that all points of a run share is subtracted first.
-        """
+        """Distance of each point from the model, (n,): RMS of gain and phase in units of noise, less the run's error."""
         return np.hypot(*self.normalise(self.deviation(self.response(model)))) / np.sqrt(2.0)
 
     def displayed_residual(self, model: Model) -> Array:

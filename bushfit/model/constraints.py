@@ -151,7 +151,7 @@ class Constraints:
         return [tie for tie in self.ties if {tie.name, *tie.names} <= values.keys()]
 
     def weaken(self, *weak: Prior) -> "Constraints":
-        """Return the constraints with some priors so wide that only what nothing else determines depends on them."""
+        """Return the constraints with some priors made so wide that they matter only for undetermined parameters."""
         priors = [
             replace(prior, covariance=_WEAK**2 * prior.covariance) if prior in weak else prior for prior in self.priors
         ]

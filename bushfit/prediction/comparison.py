@@ -197,10 +197,10 @@ def compare(
 
 
 def with_model_patterns(result: Result, predictions: Sequence[Prediction]) -> list[Prediction]:
-    """Replace errors of the model that are equal at all points by errors that vary over frequency and strain.
+    """Let the model error of predictions vary smoothly over frequency and strain, for a test of all points together.
 
-    The real and the imaginary part each get a sum of random patterns over frequency and strain (see
-    `gaussian_process.patterns`), independent between directions.
+    A prediction assumes one model error for all its points. Here the real and the imaginary part of the error are sums
+    of random patterns over frequency and strain (see `gaussian_process.patterns`), independent between directions.
 
     Args:
         result: fitted result.

@@ -183,9 +183,10 @@ def _unit_of(text: str) -> str:
 
 
 def _side_by_side(source: RowSource, layout: Layout, sides: Sequence[Side]) -> list[Segment]:
-    """Separate blocks of columns side by side; the lines above each are the cells above it that the others lack.
+    """Separate blocks of columns side by side into segments, each with the rows of one block.
 
-    Blocks that share columns are separated only if their titles differ; otherwise the list is empty.
+    The lines above a segment are the cells above its columns that the other blocks lack. Blocks that share columns are
+    separated only if their titles differ; otherwise the list is empty.
     """
     head = [line for line in source.head if line.number < layout.header_line]
     rows = [line for line in source.lines(layout.lines_before_data) if not is_comment(line.content, layout.delimiter)]

@@ -199,7 +199,9 @@ def sweep_columns(
 
 
 def _copied_rows(points: Sequence[Floats], values: Collection[Floats]) -> NDArray[np.bool_]:
-    """Mask of the rows, (n,), that equal an earlier row at a point that has more rows than most points.
+    """Mask of the rows, (n,), that were probably copied, such as where two saved files were joined.
+
+    A copied row has the numbers of an earlier row, and its operating point has more rows than most points have.
 
     Args:
         points: frequency and amplitude of each row, (n,) each.
