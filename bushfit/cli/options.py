@@ -45,33 +45,33 @@ class Option(click.Option):
             return super().type_cast_value(ctx, value)
 
 
-def option(usage: str, words: str | None = None, **more: Any) -> Parameter:
+def option(usage: str, help_text: str | None = None, **more: Any) -> Parameter:
     """Create an option of a command.
 
     Args:
         usage: names of the option, an optional name of the Python argument, and the placeholder of the value in
             capitals, such as "-o --output DIR"; a flag has no placeholder.
-        words: help text, which ends with the default in brackets; None if the option shares the text of the next
+        help_text: help text, which ends with the default in brackets; None if the option shares the text of the next
             option.
         **more: further arguments of click.option; an option with `multiple=True` says that it may be given again.
     """
-    if words and more.get("multiple"):
-        text, bracket, default = words.removesuffix(".").partition(" [")
-        words = f"{text}; may be given again{bracket}{default}."
+    if help_text and more.get("multiple"):
+        text, bracket, default = help_text.removesuffix(".").partition(" [")
+        help_text = f"{text}; may be given again{bracket}{default}."
     names = [word for word in usage.split() if word == word.lower()]
     metavar = usage.split()[-1] if len(names) < len(usage.split()) else None
-    return click.option(*names, cls=Option, metavar=metavar, help=words, **more)
+    return click.option(*names, cls=Option, metavar=metavar, help=help_text, **more)
 
 
-def flag(names: str, words: str | None = None, **more: Any) -> Parameter:
+def flag(names: str, help_text: str | None = None, **more: Any) -> Parameter:
     """Create an option without a value, which is True if given.
 
     Args:
         names: names separated by blanks; the last may be the name of the Python argument.
-        words: help text; None if the option shares the text of the next option.
+        help_text: help text; None if the option shares the text of the next option.
         **more: further arguments of click.option.
     """
-    return option(names, words, is_flag=True, **more)
+    return option(names, help_text, is_flag=True, **more)
 
 
 class Command(click.Command):
@@ -100,10 +100,10 @@ class Command(click.Command):
                 groups.setdefault(heading, []).append(record)
         for title, records in groups.items():
             names, lines = list[str](), list[tuple[str, str]]()
-            for name, words in records:
+            for name, help_text in records:
                 names.append(name)
-                if words:
-                    lines.append((", ".join(names), words))
+                if help_text:
+                    lines.append((", ".join(names), help_text))
                     names = []
             with formatter.section(title):
                 if lines:
@@ -174,10 +174,10 @@ def direction_option(action: str, default: str, name: str = "directions") -> Par
         default: default, as the help text states it.
         name: argument of the command's function.
     """
-    words = f"Direction (axial, radial, torsion) or specimen to {action} [{default}]."
-    return option(f"--direction {name} PLACE", words, multiple=True)
+    help_text = f"Direction (axial, radial, torsion) or specimen to {action} [{default}]."
+    return option(f"--direction {name} PLACE", help_text, multiple=True)
 
 
-def file_option(name: str, words: str) -> Parameter:
-    """Create an option whose value is a file, with the help text `words`."""
-    return option(f"{name} FILE", words, type=FILE)
+def file_option(name: str, help_text: str) -> Parameter:
+    """Create an option whose value is a file, with the help text `help_text`."""
+    return option(f"{name} FILE", help_text, type=FILE)

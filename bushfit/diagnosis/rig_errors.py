@@ -112,8 +112,8 @@ class RigErrors:
         """Reciprocal variances of the residuals due to random noise alone, without the errors that points share.
 
         Returns:
-            Values for each distinct factor on the noise, (factors, n); and the index of the factor of each combination
-            of sizes, (combinations,).
+            Reciprocal variances for each assumed size of the random noise, (sizes, n); and for each combination in
+            `combinations`, the index of the size that it assumes, (combinations,).
         """
         scatters, index = np.unique(self.combinations[0][:, 0], return_inverse=True)
         variances = np.ones((scatters.size, self.variance.size))

@@ -179,13 +179,16 @@ def _verdict_on_components(likely: Sequence[Composition], nothing: float, leads:
 
 
 def _leads(pairs: Sequence[tuple[Hypothesis, float]]) -> tuple[str, ...]:
-    """Names of effects in the most probable hypothesis whose probability, over all hypotheses, is 90 % or more.
+    """Names of the leads: effects in the most probable hypothesis that are present with a probability of 90 % or more.
+
+    The probability is summed over all hypotheses with the effect. Laws of friction resemble each other, so a hypothesis
+    with another law of friction counts as well.
 
     Args:
         pairs: hypotheses and their posterior probabilities, the most probable first.
 
     Returns:
-        Names; empty if there is no such effect. Laws of friction resemble each other, so one stands for all of them.
+        Names; empty if there is no such effect.
     """
     laws = {name: "friction" if get_effect(name).is_friction else name for pair in pairs for name in pair[0].effects}
     share: dict[str, float] = defaultdict(float)

@@ -142,35 +142,35 @@ def _period(time: Array, motion: Array) -> float | None:
     return float(np.median(intervals[intervals.size // 2 :])) if intervals.size else None
 
 
-def _frequency_and_cycles(loop: Loop, clock: Array, displacement: Array) -> tuple[float, float]:
+def _frequency_and_cycles(loop: Loop, time: Array, displacement: Array) -> tuple[float, float]:
     """Frequency [Hz] and number of cycles of a loop that consists of steady cycles.
 
     Args:
         loop: steady cycles of the record.
-        clock, displacement: time [s] and displacement [m or rad] of every k-th row, from `_thin_rows`, (n,) each.
+        time, displacement: time [s] and displacement [m or rad] of every k-th row, from `_thin_rows`, (n,) each.
 
     Notes:
         Several cycles are counted by crossings of the middle in one direction, and their frequency is refined by
         Gauss-Newton on the motion. A single cycle is recognised by its two ends, which meet with the same slope.
     """
-    (x, before, after), clock = _crossings(displacement), clock - loop.time[0]
-    times = clock[before] - x[before] * (clock[after] - clock[before]) / (x[after] - x[before])
+    (x, before, after), time = _crossings(displacement), time - loop.time[0]
+    times = time[before] - x[before] * (time[after] - time[before]) / (x[after] - x[before])
     rows = loop.time.size
     closed = float(loop.time[-1] - loop.time[0]) * rows / (rows - 1)
     same_sense = max(times[x[after] > 0.0], times[x[after] < 0.0], key=len)
     if same_sense.size > 1:
         counted = (same_sense.size - 1) / float(same_sense[-1] - same_sense[0])
-        frequency = _refine_frequency(clock, x, counted, rows / (closed * counted))
+        frequency = _refine_frequency(time, x, counted, rows / (closed * counted))
         return frequency, closed * frequency
-    return _frequency_of_single_cycle(loop, clock, x, times)
+    return _frequency_of_single_cycle(loop, time, x, times)
 
 
-def _frequency_of_single_cycle(loop: Loop, clock: Array, x: Array, crossings: Array) -> tuple[float, float]:
+def _frequency_of_single_cycle(loop: Loop, time: Array, x: Array, crossings: Array) -> tuple[float, float]:
     """Frequency [Hz] and number of cycles of a loop whose motion crosses its middle once upwards and once downwards.
 
     Args:
         loop: steady cycles of the record.
-        clock, x: time [s] and motion relative to its middle at every k-th row, (n,) each.
+        time, x: time [s] and motion relative to its middle at every k-th row, (n,) each.
         crossings: times of the two crossings [s].
     """
     rows, motion = loop.time.size, loop.displacement
@@ -179,14 +179,14 @@ def _frequency_of_single_cycle(loop: Loop, clock: Array, x: Array, crossings: Ar
     gap = abs(motion[-1] - motion[0])
     stride = np.abs(np.diff(motion[[0, 1, -2, -1]]))[[0, 2]].mean()
     whole = duration if gap < 0.5 * stride else closed
-    period = _period_by_ends(clock, x, duration, whole)
+    period = _period_by_ends(time, x, duration, whole)
     if period is not None:
         return 1.0 / period, closed / period
     stroke = float(crossings[1] - crossings[0]) if crossings.size == 2 else np.inf
     meets = gap < _CLOSED * np.ptp(x) / 2.0 + 1.5 * stride
     if closed > (_MORE_THAN_ONE_THAT_MEETS if meets else _MORE_THAN_ONE) * 2.0 * stroke:
-        frequency = _refine_frequency(clock, x, 0.5 / stroke, rows)
-        if closed * frequency > 1.0 and _is_periodic(clock, x, 1.0 / frequency):
+        frequency = _refine_frequency(time, x, 0.5 / stroke, rows)
+        if closed * frequency > 1.0 and _is_periodic(time, x, 1.0 / frequency):
             return frequency, closed * frequency
     if gap > _OPEN * np.ptp(x):
         raise FitError(
@@ -199,20 +199,20 @@ def _frequency_of_single_cycle(loop: Loop, clock: Array, x: Array, crossings: Ar
     return 1.0 / whole, closed / whole
 
 
-def _period_by_ends(clock: Array, x: Array, duration: float, whole: float) -> float | None:
+def _period_by_ends(time: Array, x: Array, duration: float, whole: float) -> float | None:
     """Period [s] of a motion whose last rows meet its first rows with the same slope; None if they do not.
 
     Straight lines through both ends determine how much the duration of the record differs from one cycle.
 
     Args:
-        clock, x: time [s] and motion relative to its middle, (n,) each.
+        time, x: time [s] and motion relative to its middle, (n,) each.
         duration: duration of the record [s].
         whole: expected period [s], which is returned unless the ends show a shorter one.
     """
     few, ends = max(3, int(0.02 * x.size)), []
-    for rows, origin in ((slice(few), clock[0]), (slice(-few, None), clock[-1])):
-        line = np.polynomial.Polynomial.fit(clock[rows] - origin, x[rows], 1)
-        ends.append((line(0.0), line.deriv()(0.0), np.std(x[rows] - line(clock[rows] - origin))))
+    for rows, origin in ((slice(few), time[0]), (slice(-few, None), time[-1])):
+        line = np.polynomial.Polynomial.fit(time[rows] - origin, x[rows], 1)
+        ends.append((line(0.0), line.deriv()(0.0), np.std(x[rows] - line(time[rows] - origin))))
     (first, first_slope, first_scatter), (last, last_slope, last_scatter) = ends
     slope, step = (first_slope + last_slope) / 2.0, duration / (x.size - 1)
     if first_slope * last_slope <= 0.0 or abs(last - first) > _CLOSED * duration * abs(slope):
@@ -224,11 +224,11 @@ def _period_by_ends(clock: Array, x: Array, duration: float, whole: float) -> fl
     return period if period < whole - max(1.5 * step, 4.0 * error) else whole
 
 
-def _refine_frequency(clock: Array, x: Array, frequency: float, rows_per_cycle: float) -> float:
+def _refine_frequency(time: Array, x: Array, frequency: float, rows_per_cycle: float) -> float:
     """Refine the frequency of several cycles by Gauss-Newton on the harmonics of the motion.
 
     Args:
-        clock: time of each row [s], (n,).
+        time: time of each row [s], (n,).
         x: displacement relative to the middle of its range, (n,).
         frequency: first estimate of the frequency [Hz].
         rows_per_cycle: number of rows in a cycle, which limits the number of harmonics.
@@ -237,7 +237,7 @@ def _refine_frequency(clock: Array, x: Array, frequency: float, rows_per_cycle: 
         Frequency [Hz].
     """
     chosen = spread_rows(x.size, _ROWS_TO_REFINE)
-    time, motion = clock[chosen], x[chosen]
+    time, motion = time[chosen], x[chosen]
     order = resolved_order(rows_per_cycle * chosen.size / x.size, _MOST_HARMONICS)
     number, columns = np.arange(1, order + 1), basis(time * frequency, order)
     solution = least_squares(columns, motion)
@@ -255,18 +255,18 @@ def _refine_frequency(clock: Array, x: Array, frequency: float, rows_per_cycle: 
     return frequency
 
 
-def _is_periodic(clock: Array, x: Array, period: float) -> bool:
+def _is_periodic(time: Array, x: Array, period: float) -> bool:
     """True if the last rows of a motion agree with its rows one period earlier.
 
     Args:
-        clock: time of each row [s], (n,).
+        time: time of each row [s], (n,).
         x: displacement relative to the middle of its range, (n,).
         period: duration of the assumed cycle [s].
     """
-    begin = int(np.searchsorted(clock, period))
+    begin = int(np.searchsorted(time, period))
     if x.size - begin < 2:
         return True
-    difference = shifted_difference(clock, x, -period, slice(begin, None))
+    difference = shifted_difference(time, x, -period, slice(begin, None))
     scatter = np.median(np.abs(np.diff(x, 2))) if x.size > 4 else 0.0
     return float(np.sqrt(np.mean(np.square(difference)))) < max(_REPEATS * np.ptp(x) / 2.0, _REPEATS_SCATTER * scatter)
 

@@ -263,14 +263,14 @@ def _noise(solution: Array, residual: Array) -> float:
 
 
 def phase_bins(
-    clock: Array, force: Array, frequency: float, cycles: float, *, each_cycle: bool
+    time: Array, force: Array, frequency: float, cycles: float, *, each_cycle: bool
 ) -> tuple[Array, Array, Array]:
     """Average the rows of a long loop in bins of phase, each 1/1024 of a cycle wide.
 
     Each of the first few cycles has separate bins; later cycles share bins in ever larger groups.
 
     Args:
-        clock: time of each row since the first [s], ascending, (n,).
+        time: time of each row since the first [s], ascending, (n,).
         force: force of each row [N or N m], (n,).
         frequency: frequency of the motion [Hz].
         cycles: number of cycles.
@@ -285,11 +285,11 @@ def phase_bins(
     starts = number if each_cycle else np.union1d(np.arange(separate), later.astype(np.intp))
     group = np.searchsorted(starts, number, side="right") - 1
     middle = np.round(np.bincount(group, weights=number) / np.bincount(group))
-    first = np.searchsorted(clock, np.arange(int(cycles * GRID) + 1) / (frequency * GRID))
-    bins = np.flatnonzero(np.diff(first, append=clock.size))
+    first = np.searchsorted(time, np.arange(int(cycles * GRID) + 1) / (frequency * GRID))
+    bins = np.flatnonzero(np.diff(first, append=time.size))
     first = first[bins]
-    count = np.diff(first, append=clock.size)
-    in_bins = np.add.reduceat(clock, first) * (frequency * GRID) - count * bins
+    count = np.diff(first, append=time.size)
+    in_bins = np.add.reduceat(time, first) * (frequency * GRID) - count * bins
     filled, place = np.unique(GRID * group[bins // GRID] + bins % GRID, return_inverse=True)
     parts = count, in_bins, np.add.reduceat(force, first)
     rows, inside, total = (np.bincount(place, weights=part) for part in parts)

@@ -369,7 +369,7 @@ class MeasuredSweep(MeasuredBase):
         return rows.reshape(2, -1) / self.random_noise
 
     def distance(self, model: Model) -> Array:
-        """Distance of each point from the model, (n,): RMS of gain and phase in units of noise, less the run's error."""
+        """Distance of each point from the model in units of noise, (n,): RMS of gain and phase, less shared errors."""
         return np.hypot(*self.normalise(self.deviation(self.response(model)))) / np.sqrt(2.0)
 
     def displayed_residual(self, model: Model) -> Array:

@@ -84,28 +84,30 @@ def with_preload(data: PreparedCampaign) -> PreparedCampaign:
     return replace(data, campaign=replace(data.campaign, fit=fit), preload_notes=tuple(notes))
 
 
-def alternative_preload_law(found: FitResult) -> tuple[Alternative, ...]:
-    """Alternative fit in which friction and springpot depend on the preload instead of its square, or the reverse.
+def alternative_preload_law(fit: FitResult) -> tuple[Alternative, ...]:
+    """Refit the effect of preload with the other law: linear in the preload instead of in its square, or the reverse.
+
+    Two preloads do not decide between these laws of friction and springpot.
 
     Args:
-        found: fit with the effect of preload.
+        fit: fit with the effect of preload.
 
     Returns:
-        The fit as an alternative, if the tests have only two preloads and do not rule it out, that is, if its
-        chi-square exceeds that of `found` by less than 3.84 (95 % of chance); else nothing.
+        The refitted model as an alternative, if the tests have only two preloads and its chi-square exceeds that of
+        `fit` by less than 3.84 (95 % of chance); else nothing.
 
     Notes:
         By symmetry, friction is the same for both senses of a preload, but two preloads do not determine how friction
         grows between them. A line over the preload and a line over its square are the two extreme cases.
     """
     other = dict(zip((*_ODD[1:], *_EVEN[1:]), (*_EVEN[1:], *_ODD[1:]), strict=True))
-    free = {name for name in found.names if name in other}
+    free = {name for name in fit.names if name in other}
     if not free or free & {other[name] for name in free}:
         return ()
-    names = [other.get(name, name) for name in found.names]
-    model = found.model.with_values(dict.fromkeys(free, 0.0))
-    fitted = solve_problem(replace(found.problem, model=model, names=names))
-    if fitted.chi_square > found.chi_square + _CHI_SQUARE_95:
+    names = [other.get(name, name) for name in fit.names]
+    model = fit.model.with_values(dict.fromkeys(free, 0.0))
+    fitted = solve_problem(replace(fit.problem, model=model, names=names))
+    if fitted.chi_square > fit.chi_square + _CHI_SQUARE_95:
         return ()
     return (Alternative(fitted.model, 0.5, covariance(fitted.model, [fitted.stage()], None, fitted.smooth_error)),)
 

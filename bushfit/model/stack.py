@@ -108,7 +108,12 @@ class Stack:
         return self._cycle_stack(setting, arrays).force(history)
 
     def _cycle_stack(self, setting: Setting, arrays: Values) -> Stack:
-        """Stack with some parameter values as arrays over models, operating points and samples."""
+        """Copy the stack with some parameter values replaced by arrays, to compute a cycle at all points at once.
+
+        Args:
+            setting: the test, with the conditions of these operating points.
+            arrays: values by qualified name, (..., k, 1), for k operating points.
+        """
         values = {**self.values, **arrays}
         return Stack(self.model, setting, values, acting_layers(self.model, setting, values)[: len(self.layers)])
 

@@ -291,13 +291,14 @@ class PlanSearch:
                 yield runs
 
     def noise_freedom(self, counts: Array) -> list[int]:
-        """Degrees of freedom with which repeats, of the tests so far too, determine the random noise of sweeps.
+        """Degrees of freedom of the random noise of sweeps, as repeats in the plan and in earlier tests give them.
 
         Args:
             counts: number of runs of each test, (tests,).
 
         Returns:
-            Degrees of freedom for the bushing and for each specimen, in ascending order, at most the number required.
+            Degrees of freedom for the bushing and for each specimen, in ascending order; a number above the required
+            one is replaced by the required one.
         """
         runs = Counter(self.knowledge.tests)
         runs.update({test: int(n) for test, n in zip(self.tests, counts, strict=True) if n})

@@ -78,17 +78,17 @@ class _Meaning:
 
 
 class _WideColumn(NamedTuple):
-    """Column of a wide table.
+    """Column of a wide table, apart from the first column of its block, which contains frequencies or amplitudes.
 
     Args:
         meaning: meaning of its headers.
-        down: meaning of the first column of its block.
+        first_meaning: meaning of the first column of its block.
         points: for each row, its line number, the cell of the first column, and the cell of this column.
         direction: direction in a title above its block, or above an earlier one; "" without any.
     """
 
     meaning: _Meaning
-    down: _Meaning
+    first_meaning: _Meaning
     points: list[tuple[int, str | float, str | float]]
     direction: str = ""
 
@@ -280,7 +280,7 @@ def _long_table(
     is_named = all(column.meaning.role for column in columns)
     axes = [
         dict.fromkeys((meaning.stepped, meaning.level_unit, meaning.convention) for meaning in meanings)
-        for meanings in zip(*((column.down, column.meaning) for column in columns), strict=True)
+        for meanings in zip(*((column.first_meaning, column.meaning) for column in columns), strict=True)
     ]
     if not is_named or any(len(axis) > 1 for axis in axes):
         raise MeasurementError(
