@@ -80,7 +80,7 @@ def test_the_gap_is_that_of_a_refit(measured, fitted, hidden, effects, which):
     evidence = fitted(measured(hidden, SHARED), *effects)
     (found,) = [part for part in hold_out(evidence, evidence, {}).parts if part.part == which]
     (part,) = [part for part in hold_out_parts(evidence.data_sets) if part.name == which]
-    refitted = fit_model(evidence.model, part.rest(evidence.data_sets), (), {}).model
+    refitted = fit_model(evidence.model, part.remaining_tests(evidence.data_sets), (), {}).model
     expected = np.sqrt(np.mean(residual(refitted, evidence.data_sets)[part.rows(evidence.data_sets)] ** 2))
     as_fitted = np.sqrt(np.mean(evidence.residual[part.rows(evidence.data_sets)] ** 2))
     # the parts of a block that is cut in two share an error, which whitening then treats apart
