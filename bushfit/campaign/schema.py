@@ -94,8 +94,8 @@ class RigSettings:
         max_displacement, max_rotation: largest zero-to-peak displacement or rotation [m, rad].
         max_frequency: largest frequency [Hz].
         max_velocity: largest zero-to-peak velocity [m/s].
-        minutes_per_point: time for a point of a sweep, with settling [s].
-        minutes_per_setup: time to mount the bushing in another direction [s].
+        minutes_per_point: time for a point of a sweep, with settling, such as "0.5 min" [s].
+        minutes_per_setup: time to mount the bushing in another direction, such as "30 min" [s].
     """
 
     gain_error: Share | None = None

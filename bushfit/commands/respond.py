@@ -37,7 +37,7 @@ class ResponseDocument(WarningEntries):
     """Peak force, energy and other values of the force over time, by direction, printed by `bushfit respond --json`.
 
     Args:
-        directions: figures of each direction in SI units; null without fitted tests.
+        directions: for each direction, values in SI units by name (see `TimeResponse.summary`).
         warnings: limits of the response, and corrections of the history.
     """
 

@@ -267,8 +267,8 @@ class LinearModel:
         Returns:
             Mean, (k,), and covariance within and between the noise cases, (k, k).
 
-        Notes: the amount of the relaxation has a nearly flat prior first. A prior of variance v^2 then multiplies the
-        evidence by N(a; 0, c + v^2)/N(a; 0, c), where a is its estimate and c the variance of a (Savage and Dickey).
+        Notes: the amount of the relaxation is estimated with a nearly flat prior, as a with the variance c. For a prior
+        of variance v^2, the evidence is then multiplied by N(a; 0, c + v^2)/N(a; 0, c), the Savage-Dickey ratio.
         """
         rows = np.concatenate((self.jacobian, relaxation[None]))
         signatures = SignatureSet((Signature(rows, np.eye(len(rows)), act_together=True),), self.rig)

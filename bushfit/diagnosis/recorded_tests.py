@@ -99,7 +99,7 @@ class ExplanationColumns:
 
     @cached_property
     def compound(self) -> CompoundDeviation | None:
-        """Smooth deviation of the rubber, as modes that are independent given the rig's errors; None without tests."""
+        """Smooth deviation of the rubber from the model's laws, under the rig's errors; None if `tests` has none."""
         return CompoundDeviation(self.tests.deviation, self.errors) if self.tests.deviation else None
 
     @cached_property

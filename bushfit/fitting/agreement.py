@@ -1,6 +1,6 @@
 """Compare a model with measurements: its misfit in each test and run, and its expected error in each direction.
 
-Each test and each run has its own figures, so that the thousands of rows of a loop do not hide a sweep that is missed.
+Each test and each run has its own values, so that the thousands of rows of a loop do not hide a sweep that is missed.
 """
 
 from collections.abc import Iterator, Mapping, Sequence

@@ -236,7 +236,7 @@ def quality(model: Model, data_sets: Sequence[MeasuredTest], parameters: int) ->
         parameters: number of fitted parameters.
 
     Returns:
-        Figures over all tests together; `loop_gain_error` is None without loops.
+        Measures over all tests together; `loop_gain_error` is None without loops.
     """
     squares, counts = list[Array](), [test.residual_count for test in data_sets]
     for test in data_sets:

@@ -103,7 +103,7 @@ class CovarianceTable:
     Args:
         names: names of the parameters that have errors.
         matrix: covariance matrix, in the order of the names.
-        spread: change of the matrix when one estimated figure of the noise rises by its standard error.
+        spread: changes of the matrix if an estimated noise variance rises by its standard error, one per variance.
     """
 
     names: tuple[str, ...]

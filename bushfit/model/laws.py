@@ -30,7 +30,7 @@ def register_file(file: Path, sha256: str = "") -> None:
     origin = Origin(file=str(file), sha256=hashlib.sha256(content).hexdigest())
     if sha256 not in ("", origin.sha256):
         hint = "fit the campaign again, or restore the file"
-        raise ModelError("the law is not the one that the model was fitted with", found=str(file), hint=hint)
+        raise ModelError("the file of the effect has changed since the model was fitted", found=str(file), hint=hint)
     if ORIGINS.get(file.stem) == origin:
         return
     if os.environ.get(TRUST) != "1":

@@ -39,7 +39,7 @@ _CORRECTED = 200
 
 @dataclass(frozen=True, eq=False)
 class TimeResponse(PredictedPlace):
-    """Predicted force over time for a displacement history, with figures of the motion.
+    """Predicted force over time for a displacement history, with the tested range of the motion.
 
     Args:
         direction: direction or specimen.
@@ -66,7 +66,7 @@ class TimeResponse(PredictedPlace):
 
     @cached_property
     def summary(self) -> dict[str, Any]:
-        """Figures of the motion and the force, as in `respond --json`.
+        """Values that summarise the motion and the force, as in `respond --json`.
 
         Returns:
             Peak and rms force, mean power that the motion transfers to the bushing [W] or to a unit volume of a
