@@ -36,28 +36,28 @@ def find_outliers(quantities: Mapping[str, tuple[Array, Array]]) -> tuple[dict[s
     """
     deviations, outliers = dict[str, Array](), dict[str, Array]()
     for name, (values, errors) in quantities.items():
-        usual = np.isfinite(values)
+        reference = np.isfinite(values)
         removed, outlier_count = list[int](), 0
-        for step in range(int(usual.sum()) // _PARTS_PER_OUTLIER):
-            z = _studentised_deviations(values, errors, usual)
-            if not np.isfinite(z[usual]).any():  # the others agree to the digit
+        for step in range(int(reference.sum()) // _PARTS_PER_OUTLIER):
+            z = _studentised_deviations(values, errors, reference)
+            if not np.isfinite(z[reference]).any():  # the others agree to the digit
                 break
-            worst = int(np.nanargmax(np.where(usual, np.abs(z), np.nan)))
-            p_value = 2.0 * float(stdtr(usual.sum() - 2.0, -abs(z[worst]))) * usual.sum() * len(quantities)
-            usual[worst] = False
+            worst = int(np.nanargmax(np.where(reference, np.abs(z), np.nan)))
+            p_value = 2.0 * float(stdtr(reference.sum() - 2.0, -abs(z[worst]))) * reference.sum() * len(quantities)
+            reference[worst] = False
             removed.append(worst)
             outlier_count = step + 1 if p_value < _LEVEL else outlier_count
         outliers[name] = np.isin(np.arange(values.size), removed[:outlier_count])
     outlying_parts = np.any([*outliers.values()], axis=0)
     for name, (values, errors) in quantities.items():
-        usual = usual_parts(values, name, outliers)
-        deviations[name] = _studentised_deviations(values, errors, usual)
-        limit = smallest_deviation(int(usual.sum()) + 1, len(quantities)) or math.inf
+        reference = reference_parts(values, name, outliers)
+        deviations[name] = _studentised_deviations(values, errors, reference)
+        limit = smallest_deviation(int(reference.sum()) + 1, len(quantities)) or math.inf
         outliers[name] |= outlying_parts & (np.abs(deviations[name]) > limit)
     return deviations, outliers
 
 
-def usual_parts(values: Array, name: str, outliers: Mapping[str, Array]) -> Array:
+def reference_parts(values: Array, name: str, outliers: Mapping[str, Array]) -> Array:
     """Select the reference parts, with which all parts are compared in one quantity: outliers in no quantity.
 
     Args:
@@ -70,28 +70,28 @@ def usual_parts(values: Array, name: str, outliers: Mapping[str, Array]) -> Arra
         quantity.
     """
     finite = np.isfinite(values)
-    usual = finite & ~np.any([*outliers.values()], axis=0)
-    return usual if usual.sum() >= FEWEST - 1 else finite & ~outliers[name]
+    reference = finite & ~np.any([*outliers.values()], axis=0)
+    return reference if reference.sum() >= FEWEST - 1 else finite & ~outliers[name]
 
 
-def _studentised_deviations(values: Array, errors: Array, usual: Array) -> Array:
+def _studentised_deviations(values: Array, errors: Array, reference: Array) -> Array:
     """Deviation of each value from the mean of the other reference values, in their standard deviations, (n,).
 
     Args:
         values: values of one quantity of the n parts, (n,).
         errors: standard error of each value, (n,).
-        usual: mask of the reference parts, (n,).
+        reference: mask of the reference parts, (n,).
     """
-    count, other_count = usual.sum(), usual.sum() - usual  # (n,): how many others each value is held against
+    count, other_count = reference.sum(), reference.sum() - reference  # (n,): reference values without this one
     if count < FEWEST - 1:
         return np.full(values.size, np.nan)
-    center = values[usual].mean()  # taken off first, for the digits of the sums
-    shifted, deviation = values - center, np.where(usual, values - center, 0.0)
-    mean = (shifted[usual].sum() - deviation) / other_count
-    variance = ((shifted[usual] ** 2).sum() - deviation**2 - other_count * mean**2) / (other_count - 1)
+    center = values[reference].mean()  # taken off first, for the digits of the sums
+    shifted, deviation = values - center, np.where(reference, values - center, 0.0)
+    mean = (shifted[reference].sum() - deviation) / other_count
+    variance = ((shifted[reference] ** 2).sum() - deviation**2 - other_count * mean**2) / (other_count - 1)
     square = errors**2
-    if np.isfinite(square[usual]).any():
-        typical = float(np.nanmean(square[usual]))
+    if np.isfinite(square[reference]).any():
+        typical = float(np.nanmean(square[reference]))
         variance = variance + np.maximum(np.where(np.isfinite(square), square, typical) - typical, 0.0)
     spread = np.sqrt(np.maximum(variance, 0.0) * (1.0 + 1.0 / other_count))
     with np.errstate(divide="ignore", invalid="ignore"):

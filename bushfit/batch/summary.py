@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from bushfit.batch.comparison import FEWEST, capability, find_outliers, smallest_deviation, usual_parts
+from bushfit.batch.comparison import FEWEST, capability, find_outliers, reference_parts, smallest_deviation
 from bushfit.batch.document import Estimate, RowFile
 from bushfit.batch.limits import Limits, describe_poor_fit, judge_part, resolve_limits
 from bushfit.batch.manifest import Row
@@ -205,7 +205,7 @@ class BatchResult:
         if name in self.compared_values:
             compared = self.compared_values[name][0]
             limit = smallest_deviation(int(np.isfinite(compared).sum()), len(self.compared_values))
-            usual = usual_parts(compared, name, self.outliers)
+            usual = reference_parts(compared, name, self.outliers)
             detectable = limit and limit * float(values[usual].std(ddof=1))
         bounds = self.plan.limits.bounds.get(name) if self.plan.limits and name not in FIT_NAMES else None
         low, high = self.allowed.get(name, (-np.inf, np.inf))

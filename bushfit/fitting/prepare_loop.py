@@ -300,7 +300,7 @@ def recorded_means(prepared: MeasuredLoop) -> list[Preload]:
     """Mean displacement and mean force of a loop, each only if it is too large to be a zero error of a sensor.
 
     Returns:
-        None, one or both of the means [m, rad or 1, and N or N m].
+        List of up to two means: displacement [m, rad or 1], then force [N or N m].
     """
     if prepared.datum is None:
         return []

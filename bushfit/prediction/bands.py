@@ -82,9 +82,9 @@ def agreeing_models(result: Result, *, rig: bool = False) -> list[tuple[Result, 
         rig: True to include the effects of the rig, as in the tests; False for the bushing alone, as in a car.
 
     Returns:
-        Pairs of the result that contains the errors and the model: `result` with the fitted model and every subset of
-        the effects that belong either to bushing or rig; then the alternatives that a diagnosis could not distinguish,
-        with a result that has their parameter errors and no model error.
+        Pairs of a model and, before it, the result with the errors of its parameters. First the fitted model with each
+        subset of the effects that belong either to bushing or rig, with `result`; then the alternatives that a
+        diagnosis could not distinguish, with results that have no model error.
     """
     models = [(result, model) for model in ([result.model] if rig else car_models(result.model, result.unresolved))]
     resolved = {*result.model.effects} - {*result.unresolved}
