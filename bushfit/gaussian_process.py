@@ -23,7 +23,7 @@ _JITTER = 1e-8
 #: Maximum number of nodes; chosen: all points of the paper's test plan, and little computing time.
 MAXIMUM_NODES = 100
 #: Maximum number of patterns, and minimum variance of a pattern relative to the largest; chosen for computing time.
-_MAXIMUM_PATTERNS, _MINIMUM_VARIANCE = 60, 1e-5
+_MAXIMUM_PATTERNS, MINIMUM_VARIANCE = 60, 1e-5
 #: Decimals of the coordinates, in correlation lengths, by which points are distinguished; only two if there are more
 #: than `_MANY` points, which changes their correlation by less than 1e-4.
 _DIGITS, _MANY = 6, 500
@@ -121,7 +121,7 @@ def patterns(
     points: Array,
     nodes: int = MAXIMUM_NODES,
     count: int = _MAXIMUM_PATTERNS,
-    minimum: float = _MINIMUM_VARIANCE,
+    minimum: float = MINIMUM_VARIANCE,
     correlate: Callable[[Array, Array], Array] = matern,
 ) -> tuple[Array, Array]:
     """Principal components of a Gaussian process of unit variance.

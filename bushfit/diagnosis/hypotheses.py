@@ -22,7 +22,7 @@ from bushfit.effects import get_effect, get_parameter, qualified_name
 from bushfit.effects.contract import Array
 from bushfit.fitting.problem import FitResult
 from bushfit.fitting.rig_class import ASSUMED, class_errors
-from bushfit.gaussian_process import MAXIMUM_NODES
+from bushfit.gaussian_process import MINIMUM_VARIANCE
 from bushfit.model.covariance import Covariance
 
 #: Natural log of the odds below the best at which a noise case is left out; chosen for time: a case of relative weight
@@ -256,12 +256,12 @@ class SearchState:
         """
         fit, values, rig = self.unwhitened, self.unwhitened.model.values, self.columns.errors
         rig = replace(rig, cases=[rig.cases[n] for n in self._likely_cases])
-        signature = compound_signature(fit, MAXIMUM_NODES)
+        signature = compound_signature(fit, MINIMUM_VARIANCE)
         linear = replace(self.linear, rig=rig, compound=CompoundDeviation(signature, rig) if signature else None)
         moves = self.has_influence
         slopes, count = fit.coordinates.slopes(values)[moves], np.count_nonzero(moves)
         names = tuple(np.array(fit.names)[moves].tolist())
-        mean, covariance = linear.posterior_parameters(fast_relaxation(fit))
+        mean, covariance = linear.posterior_parameters(fast_relaxation(fit)[0][0])
         steps = dict(zip(names, slopes * mean[:count], strict=True))
         means = {name: float(np.clip(values[name] + x, *get_parameter(name).bounds)) for name, x in steps.items()}
         fitted = Covariance(names, covariance[:count, :count] * np.outer(slopes, slopes))

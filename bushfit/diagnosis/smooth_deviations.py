@@ -5,6 +5,8 @@ parameters exactly. The deviation of the compound is the same function in every 
 errors of a rig differ between them. So the deviation is part of every hypothesis, with the sizes and weights of
 `priors.COMPOUND`, and no effect is named for a gap that it explains. Where a compound deviates, the one strain that
 stands for the uneven field of a direction is inexact too, and so is the stiffness of a direction for a modulus of 1.
+The rubber may also relax faster than the tests. This relaxation changes the loss at the highest frequencies, in
+proportion to frequency, more sharply than a process of the lengths `COMPOUND_LENGTHS`; a delay looks like it.
 """
 
 from collections import defaultdict
@@ -24,7 +26,6 @@ from bushfit.fitting.preparation import (
     MeasuredSweep,
     MeasuredTest,
     group_repeats,
-    residual_slices,
     split_by_kind,
 )
 from bushfit.fitting.problem import FitResult
@@ -37,8 +38,9 @@ from bushfit.reduction.harmonics import basis
 COMPOUND = "compound"
 #: Family of the power laws without a name.
 POWER_LAW = "power law"
-#: Number of patterns of the compound's deviation: with three to five levels more improve nothing.
-_COMPOUND_PATTERNS = 12
+#: Minimum variance of a pattern of the compound's deviation relative to the largest: the patterns left out are together
+#: less than a tenth of the deviation (standard deviation) at each operating point.
+_MINIMUM_VARIANCE = 3e-4
 #: Fraction of the compound's deviation that changes over the shorter lengths of a smooth curve: yield and breakdown set
 #: in within a factor of 2 or 3 of the strain.
 _COMPOUND_ROUGHNESS = 0.25
@@ -64,14 +66,14 @@ _STRAIN_ERROR, _STRAIN_STEP = 5.0, 1e-3
 _STIFFNESS_ERROR = 0.5
 
 
-def compound_signature(fit: FitResult, count: int = _COMPOUND_PATTERNS) -> Signature | None:
+def compound_signature(fit: FitResult, minimum: float = _MINIMUM_VARIANCE) -> Signature | None:
     """Changes of the residuals if the modulus of the rubber compound deviates smoothly from the model's laws.
 
     The relative deviation is a Gaussian process over frequency and strain, the same in all directions and specimens.
 
     Args:
         fit: fitted model and tests.
-        count: maximum number of patterns.
+        minimum: variance, relative to the largest pattern's, at or below which a pattern is left out.
 
     Returns:
         Signature with one column for each independent pattern of the deviation (together of unit variance at each
@@ -79,9 +81,8 @@ def compound_signature(fit: FitResult, count: int = _COMPOUND_PATTERNS) -> Signa
     """
     if not fit.data_sets:
         return None
-    limits = {"count": count, "correlate": _compound_correlation}
-    columns, changes = _smooth_changes(fit, fit.data_sets, COMPOUND_LENGTHS, **limits)
-    columns, changes = map(np.concatenate, zip((columns, changes), _formula_changes(fit), strict=True))
+    smooth = _smooth_changes(fit, fit.data_sets, COMPOUND_LENGTHS, minimum=minimum, correlate=_compound_correlation)
+    columns, changes = map(np.concatenate, zip(smooth, _formula_changes(fit), fast_relaxation(fit), strict=True))
     for loops in group_repeats(split_by_kind(fit.data_sets)[0]):
         columns = np.concatenate((columns, _repeat_changes(fit, loops, compound_shapes)))
     stiffness_change = np.zeros((len(columns), changes.shape[-1]), dtype=complex)
@@ -114,24 +115,27 @@ def _formula_changes(fit: FitResult) -> tuple[Array, Array]:
     return columns, np.concatenate(changes, axis=-1)
 
 
-def fast_relaxation(fit: FitResult) -> Array:
-    """Changes of the whitened residuals due to a relaxation of the rubber compound that is faster than the tests.
+def fast_relaxation(fit: FitResult) -> tuple[Array, Array]:
+    """Changes of residuals and stiffness due to a relaxation of the rubber compound that is faster than the tests.
 
     Far below its own frequency, a relaxation is a loss modulus proportional to frequency, as the phase of a delay is.
     The changes are those for a loss modulus that equals the median modulus |K|/(stiffness per modulus) of the tests at
     their highest frequency.
 
     Returns:
-        Changes, (n,); zero in the rows of priors, which follow those of the tests.
+        Changes of the n whitened residuals, (1, n), and relative changes of the stiffness at all operating points, (1,
+        points).
     """
-    tests = fit.data_sets
-    highest = max(float(test.frequency.max()) for test in tests)
-    factors = [stiffness_per_modulus(fit.model.bushing, test.direction) for test in tests]
+    model, tests = fit.model, fit.data_sets
+    factors = [stiffness_per_modulus(model.bushing, test.direction) for test in tests]
     modulus = np.median(np.concatenate([np.abs(test.measured) / k for test, k in zip(tests, factors, strict=True)]))
-    changes = np.zeros(fit.residual.size)
-    for test, factor, rows in zip(tests, factors, residual_slices(tests), strict=True):
-        changes[rows] = test.residual_change(1j * modulus * factor * test.frequency / highest, fit.model)
-    return changes
+    loss = 1j * modulus / max(float(test.frequency.max()) for test in tests)
+    changes = [
+        loss * factor * t.frequency / model.stiffness(t.direction, t.frequency, t.amplitude, kind=t.kind)
+        for t, factor in zip(tests, factors, strict=True)
+    ]
+    change = np.concatenate(changes)[None]
+    return _residual_changes(fit, tests, change), change
 
 
 def _compound_correlation(points: Array, nodes: Array) -> Array:

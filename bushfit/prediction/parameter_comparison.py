@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import accumulate
 
 import numpy as np
 from scipy.special import fdtrc, stdtr
@@ -194,10 +195,9 @@ def joint_contrast(difference: Array, matrix: Array, freedom: Array) -> JointCon
 
 def holm(probabilities: Sequence[float | None]) -> list[float | None]:
     """Adjust p-values for the number of tests by Holm's method (Scand. J. Statist. 6 (1979) 65); None is no test."""
-    adjusted: dict[int, float] = {}
     tested = sorted((p, index) for index, p in enumerate(probabilities) if p is not None)
-    for rank, (p, index) in enumerate(tested):
-        adjusted[index] = min(max(p * (len(tested) - rank), *adjusted.values(), 0.0), 1.0)
+    limited = (min(p * (len(tested) - rank), 1.0) for rank, (p, _) in enumerate(tested))
+    adjusted = dict(zip((index for _, index in tested), accumulate(limited, max), strict=True))
     return [adjusted.get(index) for index in range(len(probabilities))]
 
 

@@ -1,7 +1,4 @@
-"""What explains a gap proposes itself: effects by sensitivity, places by their rows, curves by their covariance.
-
-Scores of effects are what a linear refit would gain.
-"""
+"""What explains a gap proposes itself: effects by sensitivity, places by their rows, curves by their covariance."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -36,11 +33,8 @@ def best(evidence: FitResult, every: Sequence[Explanation]) -> Explanation:
     known = [each for each in every if each.signature]
     signatures = [each.signature for each in known if each.signature]
     rig = rig_errors(evidence, SHARED_RIG)
-    solution = evidence
-    precision = np.zeros(len(solution.jacobian))
-    worths = LinearModel(solution.residual, solution.jacobian, precision, rig).explanation_evidence(
-        SignatureSet.split(signatures, rig)
-    )
+    linear = LinearModel(evidence.residual, evidence.jacobian, np.zeros(len(evidence.jacobian)), rig)
+    worths = linear.explanation_evidence(SignatureSet.split(signatures, rig))
     return max(zip(known, worths, strict=True), key=lambda pair: pair[1].log_evidence)[0]
 
 
@@ -120,6 +114,18 @@ def test_the_stiffness_formula_of_a_direction_may_be_wrong_where_the_compound_de
     change[bare.residual_rows[sweep]] = sweep.residual_change(0.5 * stiffness, bare.model)
     distances = np.abs(compound_signature(bare).whole - change).max(axis=1)
     assert distances.min() < 1e-9 * np.abs(change).max()
+
+
+def test_a_relaxation_faster_than_the_tests_is_no_evidence_of_a_delay(measured, fitted):
+    """A loss modulus in proportion to frequency, up to 2 % of the modulus, where the compound may deviate."""
+    tests = RecordedTests.of_fit(fitted(measured(plan=SHARED)), SHARED_RIG)
+    found = {each.name: each.signature for each in proposals(tests.unwhitened, (), ())}
+    viscous, linear = found["viscous"], SearchState.of_tests(tests).linear
+    change = 0.02 / np.abs(viscous.stiffness_change).max() * viscous.whole[0]
+    bent = replace(linear, residual=linear.residual + change)
+    (delay,) = bent.explanation_evidence(SignatureSet.split([found["delay"]], linear.rig))
+    assert delay.log_evidence - bent.evidence.log_evidence > 50.0, "of a rubber that follows the model's laws"
+    assert delay.with_compound.log_evidence - bent.evidence.with_compound.log_evidence < 1.0
 
 
 def test_a_parameter_without_influence_is_left_out(measured, fitted):
