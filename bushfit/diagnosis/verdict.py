@@ -222,8 +222,8 @@ def _components_of(hypothesis: Hypothesis) -> frozenset[_Component]:
 def compose(pairs: Sequence[tuple[Hypothesis, float]]) -> list[Composition]:
     """Merge hypotheses with the same components, with or without a smooth deviation of the rubber, into explanations.
 
-    A set of components that is less probable than a subset is merged with the subset; an effect that is a limiting case
-    of another is merged with that effect. Faulty parts of the same kinds are merged.
+    A set of components that is less probable than a subset is merged with the subset; the same holds for a subset of
+    the set in which effects are replaced by their limiting cases. Faulty parts of the same kinds are merged.
 
     Args:
         pairs: hypotheses and their posterior weights, the most probable first.
@@ -241,10 +241,10 @@ def compose(pairs: Sequence[tuple[Hypothesis, float]]) -> list[Composition]:
         unnamed[components] += weight * (bool(hypothesis.unnamed) or is_pattern(hypothesis.faulty_parts))
     order = {chosen: rank for rank, chosen in enumerate(sorted(total, key=lambda chosen: -total[chosen]))}
     for whole in order:
-        subsets = (frozenset(chosen) for count in range(1, len(whole)) for chosen in combinations(whole, count))
         limit = frozenset((kind, (kind == "effect" and get_effect(name).limit) or name) for kind, name in whole)
-        simpler = merged.keys() & {*subsets, limit}
-        merged[min(simpler, key=order.__getitem__, default=whole)] += total[whole]
+        counts = range(1, len(whole) + 1)
+        subsets = {frozenset(s) for each in (whole, limit) for count in counts for s in combinations(each, count)}
+        merged[min(merged.keys() & subsets, key=order.__getitem__, default=whole)] += total[whole]
     kinds = defaultdict[Hashable, list[frozenset[_Component]]](list)
     for whole in sorted(merged, key=lambda chosen: -merged[chosen]):
         kinds[frozenset((kind, "" if kind.startswith(_FAULT) else name) for kind, name in whole)].append(whole)
