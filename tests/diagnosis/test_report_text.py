@@ -180,7 +180,7 @@ def told(finding: Finding) -> dict[str, float]:
         ({"frequency:50 Hz": 0.7, "inertia": 0.3}, "ambiguous", {"part: frequency": 0.7, "inertia": 0.3}),
         ({"unnamed": 0.6, "inertia": 0.4}, "described", {"unnamed": 0.6, "inertia": 0.4}),
         ({"unnamed": 0.4, "inertia": 0.6}, "ambiguous", {"unnamed": 0.4, "inertia": 0.6}),
-        ({"unnamed": 0.99, "inertia": 0.01}, "described", {"unnamed": 0.99}),
+        ({"inertia": 0.69, "fixture_resonance+delay": 0.31}, "named", {"inertia": 1.0}),
         ({"frequency:50 Hz": 0.5, "frequency:45 to 55 Hz": 0.49, "": 0.01}, "unexplained", {"part: frequency": 1.0}),
         ({"levels": 0.99, "": 0.01}, "unexplained", {"levels": 1.0}),
         ({"kraus+levels": 0.99, "": 0.01}, "unexplained", {"levels": 1.0}),
