@@ -243,7 +243,7 @@ def compose(pairs: Sequence[tuple[Hypothesis, float]]) -> list[Composition]:
     for whole in order:
         limit = frozenset((kind, (kind == "effect" and get_effect(name).limit) or name) for kind, name in whole)
         counts = range(1, len(whole) + 1)
-        subsets = {frozenset(s) for each in (whole, limit) for count in counts for s in combinations(each, count)}
+        subsets = {frozenset(part) for full in (whole, limit) for count in counts for part in combinations(full, count)}
         merged[min(merged.keys() & subsets, key=order.__getitem__, default=whole)] += total[whole]
     kinds = defaultdict[Hashable, list[frozenset[_Component]]](list)
     for whole in sorted(merged, key=lambda chosen: -merged[chosen]):
