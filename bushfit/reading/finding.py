@@ -57,7 +57,7 @@ def find_table(
     every_name = Vocabulary(ALL_COLUMNS, named, stated_units)
     may_be_wide, layouts = "amplitude" in names and header_line is None, list[tuple[RowSource, Layout]]()
     for as_written, in_one in _locate(opened, named, stated_units):
-        is_loop = {"displacement", "force"} <= Vocabulary(LOOP_COLUMNS, named).roles(as_written[1].headers)
+        is_loop = {"time", "displacement", "force"} <= Vocabulary(LOOP_COLUMNS, named).roles(as_written[1].headers)
         wide = unpivot(*as_written, opened.file, vocabulary) if may_be_wide and not is_loop else None
         layouts.append(wide or in_one)
     if len(layouts) > 1:

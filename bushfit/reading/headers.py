@@ -82,6 +82,8 @@ _SYMBOL = re.compile(r"\|?[a-z]{1,4}(?:\*|'{1,2})\|?|\|[a-z]\|")
 _UNLIKE_SYMBOL = frozenset(word for kind in ("not_measured", "real", "imaginary") for word in WORDS["qualifiers"][kind])
 #: Symbol of a travel over its unit, which is no unit of seconds: "s / mm"; and quotation mark for two primes: G".
 _TRAVEL, _TWO_PRIMES = re.compile(r"s\s*/"), re.compile(r"(?<![^\W_])([A-Za-z])\"")
+#: Quantity on the x axis in the name of a curve: "K* vs frequency [N/mm]", "K*(f)".
+VERSUS = re.compile(r"\s+(?:vs\.?|versus|over|über)\s+(?P<x>[^\[(]*[^\s\[(])|\s?\(f\)", re.IGNORECASE)
 #: Words that do not change the meaning of a channel.
 _ASIDES = re.compile(r"\b(?:axial|radial|torsional|measured|actual|gemessen|mesure|medido|ist)\b")
 #: Words for the mean of several parts, which do not change the meaning of a stiffness or its loss.
@@ -219,7 +221,8 @@ class Vocabulary:
 
     def _read(self, header: str, unit_below: str | None) -> Heading | None:
         """Find the meaning of a header cell without the cache of `heading`."""
-        text = _TWO_PRIMES.sub(r"\1''", _TAN.sub("tan delta", _CHANNEL.sub("", header))).translate(_SPELLINGS)
+        text = _TAN.sub("tan delta", _CHANNEL.sub("", VERSUS.sub("", header)))
+        text = _TWO_PRIMES.sub(r"\1''", text).translate(_SPELLINGS)
         text = _DECIBELS.sub(r" [dB \1]", text)
         logarithm = 0.0
         if match := _LOGARITHM.match(text):

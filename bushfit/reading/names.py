@@ -50,9 +50,11 @@ _DATE = re.compile(
     r"(?<!\d)(?:20\d\d([-_.]?)(?:0[1-9]|1[0-2])\1(?:0[1-9]|[12]\d|3[01])"
     r"|(?:0?[1-9]|[12]\d|3[01])\.(?:0?[1-9]|1[0-2])\.20\d\d)(?!\d)"
 )
-#: Number of a specimen, after a word or as "P01": "SN12", "Nr. 7", "Probe_3", "#4"; but not the size in "Probe 3mm".
+#: Number of a specimen, after a word or as "P01": "SN12", "Nr. 7", "Probe_3", "#4"; but not the size in "Probe 3mm",
+#: nor the hardness of natural rubber in "NR55".
 _SPECIMEN_NUMBER = re.compile(
-    rf"(?:(?:(?<![^\W_])(?:s[/_]?n|serial|nr|no|{'|'.join(WORDS['beside']['specimen'])})|#)"
+    rf"(?:(?:(?<![^\W_])(?:s[/_]?n|serial|nr(?![_\W]?\d\d[_\W]?sh|-?\d)|no|"
+    rf"(?:{'|'.join(WORDS['beside']['specimen'])})(?:[\W_]?nr)?)|#)"
     rf"[\s_.:#-]*(?!\d+[.,]?\d*[\s_]?(?:{_UNIT_WORDS})(?![A-Za-z]))|(?<![^\W_])"
     r"(?=P\d{2,4}(?![^\W_])))(P?\d[A-Za-z0-9]*)(?![^\W_]|[.,]\d)",
     re.IGNORECASE,

@@ -22,11 +22,11 @@ from bushfit.reading.headers import (
     plain,
     split_unit,
 )
-from bushfit.reading.lines import is_row, is_summary_row
+from bushfit.reading.lines import Line, is_row, is_summary_row
 from bushfit.reading.measurement import Floats
 from bushfit.reading.numerals import is_like_number
 from bushfit.reading.roles import is_test
-from bushfit.reading.source import LEAST_VALUE, Sheet
+from bushfit.reading.source import LEAST_VALUE, RowSource, Sheet
 from bushfit.reading.times import parse_clock
 
 if TYPE_CHECKING:
@@ -127,14 +127,18 @@ def note_left_out(table: Table, rows: Sequence[FaultyRow], count: int) -> Iterat
         sentence = f"line {line} begins another table ({names}): header_line = {line} in the campaign reads it"
         yield Caveat("other_table", sentence)
     if left_out := [row for row in left_out if not below or row[0] < below[0][0]]:
-        listed = [
-            f"{'row' if isinstance(table.source, Sheet) else 'line'} {line} "
-            f"({', '.join(str(cell) for cell in cells if cell != '')[:40]})"
-            for line, cells, _ in left_out[:_MOST_LISTED]
-        ]
-        more = ", ..." if len(left_out) > _MOST_LISTED else ""
-        rows_text = f"{len(left_out)} row{'s' * (len(left_out) > 1)}"
-        yield Caveat("rows_left_out", f"{rows_text} left out, without data: {', '.join(listed)}{more}")
+        yield list_left_out(table.source, [Line(*row[:2]) for row in left_out])
+
+
+def list_left_out(source: RowSource, lines: Sequence[Line]) -> Caveat:
+    """Return the warning that lists lines of a file, or rows of a sheet, that are left out."""
+    listed = [
+        f"{'row' if isinstance(source, Sheet) else 'line'} {line} "
+        f"({', '.join(str(cell) for cell in cells if cell != '')[:40]})"
+        for line, cells in lines[:_MOST_LISTED]
+    ]
+    more, rows = ", ..." * (len(lines) > _MOST_LISTED), f"{len(lines)} row{'s' * (len(lines) > 1)}"
+    return Caveat("rows_left_out", f"{rows} left out, not data of this test: {', '.join(listed)}{more}")
 
 
 def bad_row(

@@ -18,9 +18,9 @@ from bushfit import units
 from bushfit.caveat import Caveat
 from bushfit.errors import MeasurementError
 from bushfit.reading.blocks import find_segments
-from bushfit.reading.headers import ERRORS, WORDS, Vocabulary, plain
+from bushfit.reading.headers import ERRORS, VERSUS, WORDS, Vocabulary, plain
 from bushfit.reading.layout import Layout
-from bushfit.reading.lines import WITH_UNIT, Line, is_row
+from bushfit.reading.lines import WITH_UNIT, Line, is_row, is_units_row
 from bushfit.reading.measurement import FEWEST_LOOP_ROWS
 from bushfit.reading.names import name_and_values
 from bushfit.reading.numerals import is_like_number, plainest_value
@@ -113,23 +113,29 @@ def _name_curves(source: RowSource, layout: Layout) -> Sheet | None:
         MeasurementError: the curves have different x values, which do not increase from a value above zero.
     """
     names, axes = ([*map(str, cells_of(line, layout.delimiter)), ""] for line in (*source.head, *source.head)[:2])
-    if len(axes) < 5 or [plain(axis) for axis in axes[:-1]] != ["x", "y"] * (len(axes) // 2):
+    starts = [n for n, axis in enumerate(axes) if plain(axis) == "x"]
+    if len(starts) < 2 or [plain(axis) for axis in axes if axis] != ["x", "y"] * len(starts):
         return None
-    names, below = names[:-1:2], source.lines(source.head[1].number)
-    rows = [[*map(str, cells_of(line, layout.delimiter)), *axes][: len(axes) - 1] for line in below]
-    cells = [[row[n : n + 2] for row in rows if plain(row[n]) not in ("", "x")] for n in range(0, len(axes) - 1, 2)]
+    of_x, names = VERSUS.search(names[0]), ["", *(names[n] for n in starts)]
+    rows = [[*map(str, cells_of(line, layout.delimiter)), *axes] for line in source.lines(source.head[1].number)]
+    if rows and is_units_row(rows[0][: len(axes) - 1]):
+        row_of_units = [rows[0][n] for n in (starts[0], *(n + 1 for n in starts))]
+        names = [f"{name} [{unit}]" for name, unit in zip(names, row_of_units, strict=True)]
+        del rows[0]
+    names[0] = f"{of_x['x'] if of_x and of_x['x'] else 'X'}{names[0]}"
+    cells = [[row[n : n + 2] for row in rows if plain(row[n]) not in ("", "x")] for n in starts]
     curves = [np.array([[plainest_value(cell) for cell in pair] for pair in pairs]).reshape(-1, 2).T for pairs in cells]
     x, notes = curves[0][0], tuple[Caveat, ...]()
     if not all(len(curve[0]) == len(x) and np.allclose(curve[0], x, rtol=_SAME_X) for curve in curves):
         if not all(curve.size and curve[0, 0] > 0.0 and (np.diff(curve[0]) > 0.0).all() for curve in curves):
-            raise MeasurementError(**ERRORS["other_x"], found=", ".join(names))
+            raise MeasurementError(**ERRORS["other_x"], found=", ".join(names[1:]))
         low, high = max(curve[0, 0] for curve in curves), min(curve[0, -1] for curve in curves)
         x = x[(x > (1.0 - _SAME_X) * low) & (x < (1.0 + _SAME_X) * high)]
         curves = [np.array([x, np.interp(np.log(x), np.log(curve[0]), curve[1])]) for curve in curves]
-        sentence = f'the curves have x values of their own: they are interpolated at those of "{names[0]}"'
+        sentence = f'the curves have x values of their own: they are interpolated at those of "{names[1]}"'
         notes = (Caveat("resampled", sentence),)
     rows_of_curves = np.column_stack([x, *(curve[1] for curve in curves)]).tolist()
-    return Sheet("", [["X", *names], *rows_of_curves], notes=notes)
+    return Sheet("", [names, *rows_of_curves], notes=notes)
 
 
 def _spread_names(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> Sheet | None:

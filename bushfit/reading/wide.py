@@ -9,7 +9,7 @@ cell ("K* 0.1 mm [N/mm]") or in several. Of merged header cells only the leftmos
 """
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import accumulate, chain
 from pathlib import Path
@@ -20,10 +20,11 @@ from bushfit.caveat import Caveat
 from bushfit.errors import MeasurementError
 from bushfit.reading.blocks import find_segments
 from bushfit.reading.headers import COUNTED, ERRORS, AmplitudeConvention, Vocabulary, split_convention
-from bushfit.reading.layout import Layout
+from bushfit.reading.layout import MOST_HEAD_LINES, Layout
 from bushfit.reading.lines import Line, is_comment, is_row, is_summary_row, is_units_row
 from bushfit.reading.names import named_direction
 from bushfit.reading.numerals import is_like_number, plainest_value
+from bushfit.reading.rejected import list_left_out
 from bushfit.reading.reshape import KeyedValue, spread
 from bushfit.reading.roles import CONDITIONS
 from bushfit.reading.source import RowSource, Sheet, cells_of
@@ -108,46 +109,68 @@ def unpivot(source: RowSource, layout: Layout, file: Path, vocabulary: Vocabular
     Raises:
         MeasurementError: a block does not state its quantity, or blocks differ in the unit of their levels.
     """
-    roles, mark = [heading.role for cell in layout.headers if (heading := vocabulary.heading(cell))], layout.delimiter
+    roles = [heading.role for cell in layout.headers if (heading := vocabulary.heading(cell))]
     is_long = len(roles) > 2 and len(set(roles)) == len(roles) and not set(roles).isdisjoint(_STEPPED)
     has_merged_titles = "" in layout.headers and not set(roles).issuperset(_STEPPED)
     if (is_long and not has_merged_titles) or len(layout.headers) > _MOST_COLUMNS:
         return None
+    if not (blocks := _read_blocks(source.head, layout.delimiter, vocabulary))[0]:
+        return None
+    if len(source.head) >= MOST_HEAD_LINES:
+        blocks = _read_blocks(source.lines(0), layout.delimiter, vocabulary)
+    columns, texts, left_out = blocks
+    sheet, long_layout = _long_table(columns, texts, source, file, vocabulary)
+    summaries = [text for text in dict.fromkeys(texts) if is_summary_row([text])]
+    sentences = (f'the column "{text}" is left out, because it summarizes other columns' for text in summaries)
+    notes = [Caveat("summary_column", sentence) for sentence in sentences]
+    notes += [list_left_out(source, left_out)] if left_out else []
+    written = tuple(text for text in texts if any(m.role or m.stepped for m in _read_corner(text, vocabulary)))
+    return sheet, replace(long_layout, delimiter=layout.delimiter, written=written, notes=tuple(notes))
+
+
+def _read_blocks(
+    lines: Iterable[Line], delimiter: str, vocabulary: Vocabulary
+) -> tuple[list[_WideColumn], list[str], list[Line]]:
+    """Read the blocks of a wide table.
+
+    Args:
+        lines: lines or rows of the file.
+        delimiter: character between cells; "" for a sheet.
+        vocabulary: known column names, by which a header has a role such as "force".
+
+    Returns:
+        Columns of all blocks, their header cells, and the rows of numbers that belong to no block.
+    """
 
     def is_numbers(line: Line) -> bool | None:
         """True for a row of numbers, which begins with a number; None for any other line."""
         texts = list(map(str, line.content))
         return (is_row(texts) and is_like_number(next(filter(None, texts)))) or None
 
-    cells = [(line.number, cells_of(line, mark)) for line in source.head if not is_comment(line.content, mark)]
+    cells = [(line.number, cells_of(line, delimiter)) for line in lines if not is_comment(line.content, delimiter)]
     width = max((len(row) for _, row in cells), default=0)
-    lines = [Line(number, [*row, *[""] * (width - len(row))]) for number, row in cells]
-    columns, texts, direction = list[_WideColumn](), list[str](), None
-    for above, rows in find_segments(lines, is_numbers, fewest_rows=2):
-        headers = [list(map(str, line.content)) for line in above[-_MOST_HEADER_ROWS:]]
-        if not (rows and headers):
-            continue
-        if len(headers) > 1 and is_units_row(headers[-1]):  # the unit of an amplitude may be that of a stiffness
-            named = zip(headers[-2], headers.pop(), strict=True)
-            headers[-1] = [f"{name} [{unit}]" if name and unit else name or unit for name, unit in named]
-        titles = (line.text for line in above if len(line.text.split()) <= _LONGEST_TITLE)
-        direction = next(filter(None, (named_direction([title]) for title in titles)), direction)
-        corners = [[m.stepped for m in _read_corner(cell, vocabulary) if not m.level] for cell in headers[-1]]
-        start = next(n for n, cell in enumerate(rows[0].content) if cell != "")
-        repeated = [n for n in range(start + 1, width) if any(corners[n]) and corners[n] == corners[start]]
-        for side in map(slice, [start, *repeated], [*repeated, width]):
-            data = [Line(row.number, row.content[side]) for row in rows]
-            block = _read_block([row[side] for row in headers], data, vocabulary)
-            columns += [column._replace(direction=str(direction or "")) for column in block]
-        texts += [text for row in headers for text in row]
-    if not columns:
-        return None
-    sheet, long_layout = _long_table(columns, texts, source, file, vocabulary)
-    summaries = [text for text in dict.fromkeys(texts) if is_summary_row([text])]
-    left_out = (f'the column "{text}" is left out, because it summarizes other columns' for text in summaries)
-    notes = tuple(Caveat("summary_column", sentence) for sentence in left_out)
-    written = tuple(text for text in texts if any(m.role or m.stepped for m in _read_corner(text, vocabulary)))
-    return sheet, replace(long_layout, delimiter=mark, written=written, notes=notes)
+    padded = [Line(number, [*row, *[""] * (width - len(row))]) for number, row in cells]
+    columns, texts, left_out, direction, start = list[_WideColumn](), list[str](), list[Line](), None, 0
+    for above, rows in find_segments(padded, is_numbers, fewest_rows=2):
+        start = next((n for row in rows for n, cell in enumerate(row.content) if cell != ""), start)
+        left_out += [line for line in above if is_numbers(line) and line.content[start] != ""]  # levels begin later
+        headers = [list(map(str, line.content)) for line in above[-_MOST_HEADER_ROWS:] if line not in left_out]
+        blocks = list[_WideColumn]()
+        if rows and headers:
+            if len(headers) > 1 and is_units_row(headers[-1]):  # the unit of an amplitude may be that of a stiffness
+                named = zip(headers[-2], headers.pop(), strict=True)
+                headers[-1] = [f"{name} [{unit}]" if name and unit else name or unit for name, unit in named]
+            titles = (line.text for line in above if len(line.text.split()) <= _LONGEST_TITLE)
+            direction = next(filter(None, (named_direction([title]) for title in titles)), direction)
+            corners = [[m.stepped for m in _read_corner(cell, vocabulary) if not m.level] for cell in headers[-1]]
+            repeated = [n for n in range(start + 1, width) if any(corners[n]) and corners[n] == corners[start]]
+            for side in map(slice, [start, *repeated], [*repeated, width]):
+                data = [Line(row.number, row.content[side]) for row in rows]
+                blocks += _read_block([row[side] for row in headers], data, vocabulary)
+        columns += [column._replace(direction=str(direction or "")) for column in blocks]
+        texts += [text for row in headers for text in row] if blocks else []
+        left_out += [] if blocks else rows
+    return columns, texts, left_out
 
 
 def _read_block(headers: Sequence[list[str]], rows: Sequence[Line], vocabulary: Vocabulary) -> list[_WideColumn]:

@@ -65,7 +65,7 @@ def test_a_file_of_many_chunks_reads_like_a_small_one(lead, tmp_path, monkeypatc
     assert loop.source.sha256 == hashlib.sha256(text.encode()).hexdigest()
     last = lead.count("\n") + 1 + count
     spoiled = loop_from(text.rsplit(",", 1)[0] + ",abc\n", tmp_path)
-    assert spoiled.source.notes[0].text.startswith(f"1 row left out, without data: line {last} ({count - 1}")
+    assert spoiled.source.notes[0].text.startswith(f"1 row left out, not data of this test: line {last} ({count - 1}")
     assert np.array_equal(spoiled.force, loop.force[:-1])
 
 
@@ -91,7 +91,7 @@ def test_spoiled_loops_have_one_clear_error(text, words, tmp_path):
 def test_rows_without_a_number_are_left_out_and_listed(cell, tmp_path):
     loop = loop_from(with_line("\n# x\n\n" + LOOP, 8, f"0.3,{cell},3"), tmp_path)
     assert loop.force.size == len(LOOP_ROWS) - 1
-    assert loop.source.notes[0].text.startswith("1 row left out, without data: line 8 (0.3")
+    assert loop.source.notes[0].text.startswith("1 row left out, not data of this test: line 8 (0.3")
 
 
 def test_a_loop_of_a_coupon_has_strain_and_stress_and_one_in_torsion_radians(tmp_path):
