@@ -37,6 +37,8 @@ if TYPE_CHECKING:
 _MULTIPLE = re.compile(r"^(?=[\d.]*[1-9])\d+\.?\d*(?=\s+[^\W\d_])")
 #: Letter of an axis in the name of a force: "Fx", "F_z 1", "Load Y".
 _AXIS = re.compile(r"(?:^|[\W_])[a-z]?_?([xyz])(?![^\W\d_])")
+#: Word for a processed value: "Force filtered" is the same force as "Force raw", and no second load cell.
+_PROCESSED = re.compile(rf"(?<![^\W_])(?:{'|'.join(WORDS['qualifiers']['processed'])})(?![^\W_])")
 #: Starts of the names of an angular frequency.
 _ANGULAR = ("angular", "angfreq", "omega", "ω", "kreisfrequenz", "pulsa", "角频率")
 #: Start of the name of a logarithm, in the spelling that `plain` returns.
@@ -167,7 +169,8 @@ def choose_column(role: str, headers: Sequence[str]) -> str:
     """
     groups = dict[tuple[str | None, ...], list[str]]()
     for header in headers if role == "force" else ():
-        alike = named_direction([header]), split_unit(header)[1], *_AXIS.findall(header.lower())
+        marks = (*_AXIS.findall(header.lower()), *_PROCESSED.findall(header.lower()))
+        alike = named_direction([header]), split_unit(header)[1], *marks
         groups.setdefault(alike, []).append(header)
     choices = headers[:3], [" + ".join(group) for group in groups.values() if len(group) > 1]
     alone, sums = (" or ".join(f'columns = {{ {role} = "{text}" }}' for text in texts) for texts in choices)

@@ -47,7 +47,8 @@ def test_the_amplitude_in_a_name(name, text, convention):
         ("P07_axial", {"direction": Direction.AXIAL, "specimen_number": "P07"}),
         ("2kN", {"force": "2 kN"}),
         *((name, {}) for name in ("bushing_18mm_P50N", "Lager 5Hz", "part 3C", "02c", "02C", "a 21c", "0.02rad")),
-        *((name, {}) for name in ("K_1_5mm", "F1_5kN 23_5C 1e-1mm")),
+        *((name, {"specimen_number": "7"}) for name in ("Nr. 7", "Teil_Nr7")),
+        *((name, {}) for name in ("K_1_5mm", "F1_5kN 23_5C 1e-1mm", "nr55", "NR-60", "NR 45 ShA")),
     ],
 )
 def test_what_else_a_name_says(name, keys):
