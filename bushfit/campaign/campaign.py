@@ -3,7 +3,7 @@
 import hashlib
 import os
 from collections import Counter, defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import islice
@@ -19,15 +19,14 @@ from bushfit.campaign.strain import with_strain_checked
 from bushfit.campaign.toml import parse_toml
 from bushfit.caveat import join_names
 from bushfit.effects import effect_name_of, place_suffix, with_base
-from bushfit.errors import CampaignError, MeasurementError, error_location, quote_path
+from bushfit.errors import CampaignError, error_location, quote_path
 from bushfit.geometry import Bushing, Direction, Place, Specimen, get_places
 from bushfit.model.laws import register_file
 from bushfit.model.model import FIVE, Model
 from bushfit.model.transfer import FACTOR_SPREAD
 from bushfit.progress import track
-from bushfit.reading.files import view_bytes
 from bushfit.reading.finding import direction_of_table, find_table
-from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS, ZERO_TO_PEAK, split_convention
+from bushfit.reading.headers import ERRORS, LOOP_COLUMNS, SWEEP_COLUMNS, ZERO_TO_PEAK, split_convention
 from bushfit.reading.instruments import RECORDINGS
 from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import AnyTest, Loop, Sweep
@@ -104,12 +103,7 @@ def load_campaign(path: str | Path) -> Campaign:
     refuse_tests([path])
     content = _read_file(path)
     if not (content.loops or content.sweeps or content.simulate or content.compound):
-        raise CampaignError(
-            "the campaign has no tests",
-            file=path,
-            expected="[[loops]] or [[sweeps]] tables, or a [simulate] or a [compound] table",
-            hint='add [[loops]] with file = "..." and direction = "axial"',
-        )
+        raise CampaignError(**ERRORS["no_tests"], file=path)
     with error_location(path):
         bushing = content.bushing.to_bushing() if content.bushing else None
         specimens = tuple(specimens_of(content.bushings, content.specimens))
@@ -118,13 +112,29 @@ def load_campaign(path: str | Path) -> Campaign:
     with error_location(place="[report] logo"):
         logo = embed_logo(path.parent / content.report.logo) if content.report.logo else None
     names = iter(_test_names([*content.loops, *content.sweeps, *content.validation]))
-    loops, sweeps, records = (
-        track(f"{kind} read", reader_keywords(path, tests, [*islice(names, len(tests))], specimens), len(tests))
-        for kind, tests in (("loops", content.loops), ("sweeps", content.sweeps), ("records", content.validation))
-    )
+
+    def read(reader: Callable[..., Any], kind: str, tests: Sequence[Any]) -> Iterator[tuple[Any, Any]]:
+        """Read the tests of a list of the campaign.
+
+        Args:
+            reader: `read_loop` or `read_sweep`.
+            kind: name of the list, such as "loops".
+            tests: tables of the list.
+
+        Yields:
+            Each test, and its table.
+        """
+        arguments = reader_keywords(path, tests, [*islice(names, len(tests))], specimens)
+        for number, _ in enumerate(track(f"{kind} read", tests), start=1):
+            with error_location(place=f"[[{kind}]] #{number} of {path}"):
+                keywords = next(arguments)
+                measured = reader(**keywords)
+            yield measured, keywords["test"]
+
     check = partial(with_strain_checked, bushing=bushing)
-    all_loops = [check(loop) for keywords in loops for loop in split_record(read_loop(**keywords), keywords["test"])]
-    all_sweeps = [check(read_sweep(**keywords)) for keywords in sweeps]
+    all_loops = [check(loop) for record in read(read_loop, "loops", content.loops) for loop in split_record(*record)]
+    all_sweeps = [check(sweep) for sweep, _ in read(read_sweep, "sweeps", content.sweeps)]
+    records = read(read_loop, "validation", content.validation)
     tests: list[Loop | Sweep] = [*all_loops, *all_sweeps]
     units = {test.direction: test.preload.unit for test in tests if test.preload and test.preload.value}
     several = join_names(table.name for table in content.bushings)
@@ -134,7 +144,7 @@ def load_campaign(path: str | Path) -> Campaign:
         "specimens": specimens,
         "loops": with_unit_of_zero(without_copied_loops(all_loops), units),
         "sweeps": with_unit_of_zero(without_copied_points(all_sweeps), units),
-        "validation": tuple(prepare_record(read_loop(**keywords), keywords["test"].lowpass) for keywords in records),
+        "validation": tuple(prepare_record(record, test.lowpass) for record, test in records),
         "sha256": hashlib.sha256(path.read_bytes()).hexdigest(),
         "logo": logo,
     }
@@ -172,8 +182,7 @@ def load_bushing(path: Path) -> Bushing:
     """
     table = _read_file(path).bushing
     if table is None:
-        expected = "a [bushing] table with name, inner_radius, outer_radius and length"
-        raise CampaignError("the file has no [bushing] table", file=path, expected=expected)
+        raise CampaignError(**ERRORS["no_bushing"], file=path)
     with error_location(path):
         return table.to_bushing()
 
@@ -182,11 +191,9 @@ def _check_bodies(content: CampaignFile) -> None:
     """Raise a CampaignError for missing or repeated bodies, [bushing] and [[bushings]], or bushings without tests."""
     names = [*(table.name for table in content.bushings), *(table.name for table in content.specimens)]
     if not (content.bushing or names):
-        expected = "[bushing] with its name, radii and length, [[bushings]] or [[specimens]]"
-        raise CampaignError("the campaign does not state what was tested", expected=expected)
+        raise CampaignError(**ERRORS["no_body"])
     if content.bushing and content.bushings:
-        expected = "[bushing] for one bushing, or [[bushings]] for several of one compound"
-        raise CampaignError("two lists of bushings", found="[bushing] and [[bushings]]", expected=expected)
+        raise CampaignError(**ERRORS["two_lists"])
     all_names = [*names, *(f"{table.name} {axis}" for table in content.bushings for axis in Direction)]
     if doubles := {name for name in all_names if all_names.count(name) > 1}:
         table = "[[bushings]]" if content.bushings else "[[specimens]]"
@@ -194,9 +201,8 @@ def _check_bodies(content: CampaignFile) -> None:
     tested = {test.bushing or test.specimen for test in (*content.loops, *content.sweeps)}
     untested = [table.name for table in content.bushings if table.name not in tested]
     if tested and untested and tested <= {*names}:  # a test of no body is refused where it is read
-        hint = "bushfit predict --bushing FILE predicts a bushing that was not tested from its [bushing] in a file"
         expected = f'a test with bushing = "{untested[0]}"'
-        raise CampaignError("a bushing has no tests", found=untested[0], expected=expected, hint=hint)
+        raise CampaignError(**ERRORS["untested_bushing"], found=untested[0], expected=expected)
 
 
 def _check_places(content: CampaignFile, specimens: Sequence[Specimen]) -> None:
@@ -228,12 +234,7 @@ def model_of(campaign: Campaign) -> Model:
         ModelError: an unknown effect or an impossible value.
     """
     if campaign.simulate is None:
-        raise CampaignError(
-            "the campaign does not state what to simulate",
-            file=campaign.path,
-            expected="a [simulate] table that states the material parameters",
-            hint="or fit the campaign first and simulate its model.json",
-        )
+        raise CampaignError(**ERRORS["nothing_to_simulate"], file=campaign.path)
     values = campaign.simulate.parameters
     missing = [name for name in FIVE if name not in values]
     if missing:
@@ -269,8 +270,7 @@ def refuse_tests(paths: Sequence[Path]) -> None:
         )
     if campaigns:
         hint = f"give the campaign of the folder: {' or '.join(campaigns)}"
-    expected = "a .toml file that names the bushing and its tests"
-    raise CampaignError("a campaign is needed", file=[*tests, model][0], found=found, expected=expected, hint=hint)
+    raise CampaignError(**ERRORS["no_campaign"], file=[*tests, model][0], found=found, hint=hint)
 
 
 def reader_keywords(
@@ -299,13 +299,10 @@ def reader_keywords(
     for test, source, name in zip(tests, sources, names, strict=True):
         if (identity := (*source, test.direction, test.specimen_number, *test.rows.items())) in listed_tests:
             expected = "each file, or each sheet of a file, once"
-            raise CampaignError("a file is listed twice", file=path, found=test.file, expected=expected)
+            raise CampaignError("a file is listed twice", file=path, place=test.file, expected=expected)
         listed_tests.add(identity)
         shared = counts[source] > 1
         keywords: dict[str, Any] = {"file": path.parent / test.file, "test": test, "name": name, "shared": shared}
-        if not os.path.exists(keywords["file"]):  # noqa: PTH110  # Path.exists raises an error for a long name
-            with error_location(place=f"named in {path}, relative to its folder"):
-                view_bytes(keywords["file"], MeasurementError)
         if test.direction is None and test.specimen is None:
             names_of = SWEEP_COLUMNS if isinstance(test, SweepFile) else LOOP_COLUMNS
             table = find_table(keywords["file"], names_of, test.columns, test.units, test)

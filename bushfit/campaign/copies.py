@@ -1,7 +1,7 @@
 """Leave out copies: tests that a campaign lists under two names, and points that several tests or repeats share.
 
 Copies may be exported again with other units, fewer digits or rows, or another start of time. Rows are therefore equal
-if they agree within the last decimal place of the numbers with fewer decimals.
+if they agree within the last decimal place, in the unit of the file, of the numbers with fewer decimals.
 """
 
 from collections import Counter, defaultdict
@@ -15,6 +15,7 @@ import numpy as np
 from bushfit.caveat import Caveat, join_names
 from bushfit.effects.contract import Array
 from bushfit.reading.measurement import AnyTest, Loop, Sweep, loss_factor
+from bushfit.units import si_factor
 
 #: Minimum number of identical points that are copies; chosen: fewer may agree by chance in rounded files.
 _FEWEST_POINTS = 5
@@ -25,30 +26,41 @@ _DIGITS = 3, 10
 _ROUNDING = 1e-4
 #: Run of a sweep: index of the sweep, and repeat and level of the run (None if the sweep is one run).
 _Run = tuple[int, Any]
-#: Number of rows from which the last decimal place of a column is determined; chosen, to save time.
-_ROWS = 1000
+#: Number of rows, evenly spread, that show the last decimal place of a column; chosen: one number in ten ends in 0.
+_ROWS = 100
+#: SI factors of the units of files, apart from powers of ten.
+_NAMES = ("m", "in", "lbf", "lbf/in", "psi", "kgf", "lbf*in", "lbf*ft", "deg", "min")
+_UNITS = np.array([si_factor(unit, unit) for unit in _NAMES])
 
 
 class _Rows(NamedTuple):
-    """Numbers of a test, (c, n), and half the last decimal place of each of its c columns, (c, 1)."""
+    """Numbers of a test, (c, n), and by column, (c, 1), half the last place that its file contains, and the unit there.
+
+    The unit is given by its SI factor, apart from a power of ten.
+    """
 
     numbers: Array
     half_place: Array
+    unit: Array
 
     @classmethod
     def of_columns(cls, *columns: Array) -> "_Rows":
-        """Build the rows from c columns, (n,) each."""
+        """Build the rows from c columns in SI, (n,) each, which contain the fewest digits in the unit of the file."""
         numbers = np.stack(columns)
-        largest = np.abs(numbers).max(axis=1).clip(min=1e-300)
-        places = 10.0 ** (np.floor(np.log10(largest)) - np.arange(*_DIGITS)[:, None] + 1.0)
-        in_places = numbers[:, :_ROWS] / places[..., None]
+        largest = np.abs(numbers).max(axis=1, keepdims=True).clip(min=1e-300) / _UNITS
+        digits = np.arange(*_DIGITS)[:, None]
+        places = _UNITS * 10.0 ** (np.floor(np.log10(largest))[:, None] + 1.0 - digits)
+        in_places = numbers[:, None, None, :: numbers.shape[1] // _ROWS + 1] / places[..., None]
         is_decimal = np.all(np.abs(in_places - np.round(in_places)) < _ROUNDING, axis=-1)
-        is_decimal[-1] = True
-        return cls(numbers, 0.5 * places[is_decimal.argmax(axis=0), np.arange(len(numbers))][:, None])
+        is_decimal[:, -1, 0] = True
+        first = is_decimal.reshape(len(numbers), -1).argmax(axis=1)[:, None]
+        places = np.take_along_axis(places.reshape(len(numbers), -1), first, axis=1)
+        return cls(numbers, 0.5 * places, _UNITS[first % len(_UNITS)])
 
     def tolerance(self, copy: "_Rows") -> Array:
-        """Largest difference of equal numbers of two tests by column, (c, 1)."""
-        return (1.0 + _ROUNDING) * np.maximum(self.half_place, copy.half_place)
+        """Largest difference of equal numbers of two tests by column, (c, 1): both are rounded if the units differ."""
+        larger, smaller = (choose(self.half_place, copy.half_place) for choose in (np.maximum, np.minimum))
+        return (1.0 + _ROUNDING) * (larger + smaller * (self.unit != copy.unit))
 
 
 def group_copies(loops: Sequence[Loop]) -> list[list[Loop]]:
@@ -93,12 +105,10 @@ def copied_points(sweeps: Sequence[Sweep]) -> dict[tuple[int, int], list[int]]:
     Returns:
         Indices of the copied rows of a sweep, by the indices of this sweep and of the sweep with the original rows.
     """
-    runs, run_of = defaultdict[_Run, list[int]](list), list[list[_Run]]()
-    for index, sweep in enumerate(sweeps):
-        levels = zip(sweep.repeat.tolist(), sweep.run_level.tolist(), strict=True)
-        run_of.append([(index, level if sweep.stepped else None) for level in levels])
-        for row, run in enumerate(run_of[-1]):
-            runs[run].append(row)
+    levels = [zip(sweep.repeat.tolist(), sweep.run_level.tolist(), strict=True) for sweep in sweeps]
+    run_of: list[list[_Run]] = [
+        [(index, level if sweep.stepped else None) for level in levels[index]] for index, sweep in enumerate(sweeps)
+    ]
     twins = [[set[_Run]() for _ in of_rows] for of_rows in run_of]
     copies: defaultdict[tuple[int, int], set[int]] = defaultdict(set)
     forms = [_forms(sweep) for sweep in sweeps]
@@ -110,8 +120,9 @@ def copied_points(sweeps: Sequence[Sweep]) -> dict[tuple[int, int], list[int]]:
                 if row < twin and run_of[first][row] == run_of[second][twin]:
                     copies[first, first].add(twin)
     copied = set[_Run]()
-    for run, rows in reversed(runs.items()):
+    for run in reversed(dict.fromkeys(chain.from_iterable(run_of))):
         index = run[0]
+        rows = [row for row, run_of_row in enumerate(run_of[index]) if run_of_row == run]
         equal_runs = (twins[index][row] - {run} - copied for row in rows)
         # a run of this sweep, or another sweep
         originals = [{twin if twin[0] == index else (twin[0], None) for twin in equal} for equal in equal_runs]

@@ -32,6 +32,7 @@ from bushfit.reading.inference import (
     moves_along,
     name_parallel_spring,
 )
+from bushfit.reading.lines import fill_merged
 from bushfit.reading.roles import PAIRS
 from bushfit.reading.si_columns import choose_column, column_of, first_numbers, is_angular, refuse_second_unit
 from bushfit.reading.table import Table
@@ -130,6 +131,11 @@ def classify(
     notes += convert_roles(roles, certain=columns)
     time = roles.get("time")
     is_clock = time is not None and parse_clock(str(table.first_row[time.index])) is not None
+    of_roles = {column.header for column in roles.values()}
+    for index, title in enumerate(fill_merged(table.headers)):
+        if title in of_roles and not table.headers[index] and table.holds_numbers(index):
+            sentence = f'column {index + 1} has no name and is left out: it may belong to "{title}" on its left'
+            notes.append(Caveat("unnamed_column", sentence))
     notes = [*table.layout.notes, *notes]
     clocks = frozenset({time.index} if time and is_clock else ())
     return replace(table, roles=roles, notes=tuple(notes), clocks=clocks)
@@ -213,10 +219,9 @@ def _stated_columns(
         elif text.isdecimal() or role not in named_roles:
             near = next(iter(get_close_matches(text, table.headers if table.is_table else (), 1, _ALIKE)), "")
             advice = f'did you mean "{near}"?' if near else "name one of this file:"
-            problem = f'there is no column "{text}"'
             expected = f"the header that was stated for the {role.replace('_', ' ')}, or its number"
             hint = f'{advice} columns = {{ {role} = "{near or "..."}" }} in the campaign'
-            raise table.header_error(problem, kind=NoColumnError, expected=expected, hint=hint)
+            raise table.header_error(f'there is no column "{text}"', kind=NoColumnError, expected=expected, hint=hint)
     return roles
 
 

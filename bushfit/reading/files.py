@@ -99,8 +99,7 @@ def view_bytes(
         raise kind("the file cannot be read", file=file, found=error.strerror or str(error)) from error
     if len(data) != size:
         found = f"{'more than' if len(data) > size else f'{len(data)} of'} {size} bytes"
-        hint = "wait until the file is written or copied completely"
-        raise kind("the file changes while it is read", file=file, found=found, hint=hint)
+        raise kind(**ERRORS["changing_file"], file=file, found=found)
     if data.isspace() or not data:
         raise kind("the file is empty", file=file, expected="text", hint="export it again")
     return data
@@ -305,6 +304,5 @@ def _decoding_error(data: bytes, file: Path, bad: int, encoding: str) -> Measure
         file=file,
         place=line_of(data, bad),
         found=f"byte 0x{data[bad]:02x}",
-        expected="a table as text (such as UTF-8, UTF-16, Latin-1, GB18030), a workbook, or a recording such as .tdms",
-        hint='export it as "CSV UTF-8", or state encoding = "..." in the campaign',
+        **ERRORS["not_text"],
     )

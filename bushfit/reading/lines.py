@@ -2,7 +2,8 @@
 
 import csv
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from itertools import accumulate
 from typing import NamedTuple
 
 from bushfit import units
@@ -99,3 +100,9 @@ def cells_below(header: str, row: str) -> list[str]:
     }
     aligned = [by_column.get(n, "") for n in range(len(spans))]
     return aligned if len(by_column) == len(cells) < len(spans) else [text for *_, text in cells]
+
+
+def fill_merged(cells: Sequence[str]) -> list[str]:
+    """Fill each empty cell in a row of headers with the text of the nearest filled cell on its left."""
+    merged: Iterator[str] = accumulate(cells, lambda before, cell: cell or before)
+    return list(merged)

@@ -188,19 +188,16 @@ def check_stiffness(
         MeasurementError: the loss is implausible, or other columns give another stiffness; the sign of their loss is
             not compared.
     """
-    column, problem = columns[pair[1]], ""
+    column = columns[pair[1]]
     largest = float(np.nan_to_num(np.abs(loss_factor), nan=np.inf).max())
     scale = column.scale if column.role == "loss_factor" else 1.0
     if np.mean(loss_factor < -LEAST_LOSS_FACTOR) > _THROUGHOUT:
-        problem = "the loss has the opposite sign"
         found = f"{np.count_nonzero(loss_factor < 0.0)} of {loss_factor.size} rows below zero"
-        expected = "a force that leads the displacement: phase, loss factor and loss stiffness above zero"
-        hint = "take phase_sign out of the campaign, or state phase_sign = -1"
-    elif scale != 1.0 and 0.0 < largest < LEAST_LOSS_FACTOR:
+        raise table.error(**ERRORS["opposite_loss"], column=column, found=found)
+    if scale != 1.0 and 0.0 < largest < LEAST_LOSS_FACTOR:
         problem, found = "no rubber has a loss this small", f"{largest / scale:.3g} {column.unit} at most"
         expected = f"a loss factor above {LEAST_LOSS_FACTOR / scale:g} {column.unit} somewhere"
         hint = f'if these are ratios, write "[-]" for "[{column.unit}]" in the header'
-    if problem:
         raise table.error(problem, column=column, found=found, expected=expected, hint=hint)
     low, high = _LOSS_FACTORS
     likelier = {"phase": "rad" if column.unit != "rad" else "deg", "loss_factor": "%"}.get(column.role)

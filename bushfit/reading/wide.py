@@ -9,9 +9,9 @@ cell ("K* 0.1 mm [N/mm]") or in several. Of merged header cells only the leftmos
 """
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from itertools import accumulate, chain
+from itertools import chain
 from pathlib import Path
 from typing import NamedTuple
 
@@ -21,7 +21,7 @@ from bushfit.errors import MeasurementError
 from bushfit.reading.blocks import find_segments
 from bushfit.reading.headers import COUNTED, ERRORS, AmplitudeConvention, Vocabulary, split_convention
 from bushfit.reading.layout import MOST_HEAD_LINES, Layout
-from bushfit.reading.lines import Line, is_comment, is_row, is_summary_row, is_units_row
+from bushfit.reading.lines import Line, fill_merged, is_comment, is_row, is_summary_row, is_units_row
 from bushfit.reading.names import named_direction
 from bushfit.reading.numerals import is_like_number, plainest_value
 from bushfit.reading.rejected import list_left_out
@@ -185,7 +185,7 @@ def _read_block(headers: Sequence[list[str]], rows: Sequence[Line], vocabulary: 
     meanings = dict.fromkeys(columns, _Meaning())
     down, across = _Meaning(), _Meaning()
     for distance, cells in enumerate(reversed(headers)):
-        texts = _fill_merged(cells) if distance else cells
+        texts = fill_merged(cells) if distance else cells
         row = {column: _read_header(texts[column], vocabulary) for column in columns}
         levels = {meaning.stepped for meaning in row.values() if meaning.level}
         unclear = [column for column in columns if texts[column] and row[column] == _Meaning()]
@@ -211,7 +211,7 @@ def _read_block(headers: Sequence[list[str]], rows: Sequence[Line], vocabulary: 
     meanings = {n: meanings[n] | across | _Meaning(stepped=stepped) for n in columns}
     if stepped is None or len(columns) < 2 or not all(meaning.level for meaning in meanings.values()):
         return []
-    all_texts = list(map(_fill_merged, headers))
+    all_texts = list(map(fill_merged, headers))
     named = {(meaning, *(texts[column] for texts in all_texts)) for column, meaning in meanings.items()}
     if len(named) > len(set(meanings.values())):
         return []  # such as K axial and K radial, or two samples, at the same level
@@ -220,12 +220,6 @@ def _read_block(headers: Sequence[list[str]], rows: Sequence[Line], vocabulary: 
         _WideColumn(meaning, down, [(row.number, row.content[0], row.content[n]) for row in rows])
         for n, meaning in meanings.items()
     ]
-
-
-def _fill_merged(cells: Sequence[str]) -> list[str]:
-    """Fill each empty cell in a row of headers with the text of the nearest filled cell on its left."""
-    merged: Iterator[str] = accumulate(cells, lambda before, cell: cell or before)
-    return list(merged)
 
 
 def _read_corner(text: str, vocabulary: Vocabulary) -> list[_Meaning]:

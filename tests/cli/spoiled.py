@@ -47,7 +47,7 @@ UNWRITTEN: list[tuple[str, str, str, str | bytes, list[str]]] = [
     ("an integer of many digits", "predict", "model.json", '{"schema": ' + "9" * 5000 + "}", ["model.json: this is not valid JSON"]),
     ("a model of 10 MB", "predict", "model.json", " " * 10_000_001 + "{}", ["model.json: the file is too large"]),
     ("binary loop", "fit", "loop.csv", b"\x00\x01\x02" * 100, ["loop.csv, line 1: this is not text", 'export it as "CSV UTF-8", or state encoding = "..."']),
-    ("a workbook cut short", "fit", "loop.csv", b"PK\x03\x04" + b"x" * 100, ["loop.csv: the workbook cannot be read", "save it again as xlsx"]),
+    ("a workbook cut short", "fit", "loop.csv", b"PK\x03\x04" + b"x" * 100, ["#1 of campaign.toml: the workbook cannot be read", "save it again as xlsx"]),
     ("zeros far behind the head", "fit", "loop.csv", FILES["loop.csv"].encode() * 40 + bytes(5), ["loop.csv, line ", "this is not text", "byte 0x00"]),
     ("zeros in a file of Latin letters", "fit", "loop.csv", (FILES["loop.csv"] + "\xe4\n").encode("latin-1") * 40 + b"1,2\x00,3\n", ["this is not text", "byte 0x00"]),
 ]  # fmt: skip

@@ -164,9 +164,8 @@ def test_a_workbook_with_a_forgotten_cell_far_away(bombed):
     (bombed / "book.xlsx").write_bytes(
         workbook(['</sheetData><dimension ref="A1:XFD1048576"/><sheetData>' + far_apart()])
     )
-    refused(
-        bounded(bombed, "fit", "book.toml", "-o", "x"), bombed / "x", "book.xlsx: the workbook is too large", "save the"
-    )
+    done = bounded(bombed, "fit", "book.toml", "-o", "x")
+    refused(done, bombed / "x", "of book.toml: the workbook is too large", "save the")
 
 
 def test_a_packed_file_whose_content_is_too_large(bombed):
