@@ -65,13 +65,13 @@ def error_location(file: Path | None = None, place: str | None = None, hint: str
 
     Args:
         file: replaces the file of the error, unless None.
-        place: place of errors without one.
+        place: replaces the place of the error, unless None.
         hint: next step for errors without one.
     """
     try:
         yield
     except BushfitError as error:
-        error.file, error.place, error.hint = file or error.file, error.place or place, error.hint or hint
+        error.file, error.place, error.hint = file or error.file, place or error.place, error.hint or hint
         raise
 
 
