@@ -127,8 +127,7 @@ def load_campaign(path: str | Path) -> Campaign:
         arguments = reader_keywords(path, tests, [*islice(names, len(tests))], specimens)
         for number, _ in enumerate(track(f"{kind} read", tests), start=1):
             try:
-                keywords = next(arguments)
-                measured = reader(**keywords)
+                measured = reader(**(keywords := next(arguments)))
             except BushfitError as error:
                 error.place = error.place or f"[[{kind}]] #{number} of {path}"
                 raise

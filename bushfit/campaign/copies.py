@@ -48,8 +48,7 @@ class _Rows(NamedTuple):
         """Build the rows from c columns in SI, (n,) each, which contain the fewest digits in the unit of the file."""
         numbers = np.stack(columns)
         largest = np.abs(numbers).max(axis=1, keepdims=True).clip(min=1e-300) / _UNITS
-        digits = np.arange(*_DIGITS)[:, None]
-        places = _UNITS * 10.0 ** (np.floor(np.log10(largest))[:, None] + 1.0 - digits)
+        places = _UNITS * 10.0 ** (np.floor(np.log10(largest))[:, None] + 1.0 - np.arange(*_DIGITS)[:, None])
         in_places = numbers[:, None, None, :: numbers.shape[1] // _ROWS + 1] / places[..., None]
         is_decimal = np.all(np.abs(in_places - np.round(in_places)) < _ROUNDING, axis=-1)
         is_decimal[:, -1, 0] = True

@@ -131,9 +131,9 @@ def classify(
     notes += convert_roles(roles, certain=columns)
     time = roles.get("time")
     is_clock = time is not None and parse_clock(str(table.first_row[time.index])) is not None
-    of_roles = {column.header for column in roles.values()}
     for index, title in enumerate(fill_merged(table.headers)):
-        if title in of_roles and not table.headers[index] and table.holds_numbers(index):
+        is_of_role = title in {column.header for column in roles.values()}
+        if is_of_role and not table.headers[index] and table.holds_numbers(index):
             sentence = f'column {index + 1} has no name and is left out: it may belong to "{title}" on its left'
             notes.append(Caveat("unnamed_column", sentence))
     notes = [*table.layout.notes, *notes]

@@ -126,19 +126,19 @@ def note_left_out(table: Table, rows: Sequence[FaultyRow], count: int) -> Iterat
     for line, names in below:
         sentence = f"line {line} begins another table ({names}): header_line = {line} in the campaign reads it"
         yield Caveat("other_table", sentence)
-    if left_out := [row for row in left_out if not below or row[0] < below[0][0]]:
-        yield list_left_out(table.source, [Line(*row[:2]) for row in left_out])
+    yield from list_left_out(table.source, [Line(*row[:2]) for row in left_out if not below or row[0] < below[0][0]])
 
 
-def list_left_out(source: RowSource, lines: Sequence[Line]) -> Caveat:
-    """Return the warning that lists lines of a file, or rows of a sheet, that are left out."""
+def list_left_out(source: RowSource, lines: Sequence[Line]) -> Iterator[Caveat]:
+    """Yield the warning that lists lines of a file, or rows of a sheet, that are left out; nothing without lines."""
     listed = [
         f"{'row' if isinstance(source, Sheet) else 'line'} {line} "
         f"({', '.join(str(cell) for cell in cells if cell != '')[:40]})"
         for line, cells in lines[:_MOST_LISTED]
     ]
     more, rows = ", ..." * (len(lines) > _MOST_LISTED), f"{len(lines)} row{'s' * (len(lines) > 1)}"
-    return Caveat("rows_left_out", f"{rows} left out, not data of this test: {', '.join(listed)}{more}")
+    if lines:
+        yield Caveat("rows_left_out", f"{rows} left out, not data of this test: {', '.join(listed)}{more}")
 
 
 def bad_row(

@@ -114,16 +114,15 @@ def unpivot(source: RowSource, layout: Layout, file: Path, vocabulary: Vocabular
     has_merged_titles = "" in layout.headers and not set(roles).issuperset(_STEPPED)
     if (is_long and not has_merged_titles) or len(layout.headers) > _MOST_COLUMNS:
         return None
-    if not (blocks := _read_blocks(source.head, layout.delimiter, vocabulary))[0]:
+    columns, texts, left_out = _read_blocks(source.head, layout.delimiter, vocabulary)
+    if not columns:
         return None
     if len(source.head) >= MOST_HEAD_LINES:
-        blocks = _read_blocks(source.lines(0), layout.delimiter, vocabulary)
-    columns, texts, left_out = blocks
+        columns, texts, left_out = _read_blocks(source.lines(0), layout.delimiter, vocabulary)
     sheet, long_layout = _long_table(columns, texts, source, file, vocabulary)
     summaries = [text for text in dict.fromkeys(texts) if is_summary_row([text])]
     sentences = (f'the column "{text}" is left out, because it summarizes other columns' for text in summaries)
-    notes = [Caveat("summary_column", sentence) for sentence in sentences]
-    notes += [list_left_out(source, left_out)] if left_out else []
+    notes = [*(Caveat("summary_column", sentence) for sentence in sentences), *list_left_out(source, left_out)]
     written = tuple(text for text in texts if any(m.role or m.stepped for m in _read_corner(text, vocabulary)))
     return sheet, replace(long_layout, delimiter=layout.delimiter, written=written, notes=tuple(notes))
 
