@@ -130,7 +130,11 @@ def note_left_out(table: Table, rows: Sequence[FaultyRow], count: int) -> Iterat
 
 
 def list_left_out(source: RowSource, lines: Sequence[Line]) -> Iterator[Caveat]:
-    """Yield the warning that lists lines of a file, or rows of a sheet, that are left out; nothing without lines."""
+    """Warn of lines of a file, or rows of a sheet, that are left out.
+
+    Yields:
+        The warning, which lists the first lines; nothing without lines.
+    """
     listed = [
         f"{'row' if isinstance(source, Sheet) else 'line'} {line} "
         f"({', '.join(str(cell) for cell in cells if cell != '')[:40]})"
