@@ -53,15 +53,16 @@ def model_file(path: Path) -> Path:
         return path / "model.json"
     if path.is_dir() or (path.is_file() and ending in (".toml", *TEST_FILES)):
         found = "a folder without model.json" if path.is_dir() else "a campaign" if ending == ".toml" else "a test file"
-        advice = "to write one" if ending == ".toml" else "to write a campaign, which bushfit run then fits"
-        command = f"bushfit {'run' if ending == '.toml' else 'init'} {quote_path(path)}"
+        campaign = next(iter(sorted(path.glob("*.toml"))), path)
+        steps = "to write a campaign, which bushfit run then fits: bushfit init", "to write one: bushfit run"
+        step = f"{steps[campaign.suffix.lower() == '.toml']} {quote_path(campaign)}"
         models = [quote_path(path / name) for name in ("fit", "diagnose") if (path / name / "model.json").is_file()]
         raise ModelError(
             "a fitted model is needed",
             file=path,
             found=found,
             expected="a .json file, as bushfit run, the fits and diagnose write it, or its folder",
-            hint=f"name {' or '.join(models)}" if models else f"{advice}: {command}",
+            hint=f"name {' or '.join(models)}" if models else step,
         )
     return path
 
