@@ -276,9 +276,10 @@ class Search:
                 self.refits.update({name: fits.get(name) for name in models})
             for name, fit in fits.items():
                 log_odds = self._log_odds("effect", name)
-                candidate = self._visit(state.with_fit(fit).with_effect(name, log_odds, state.fit))
-                if name not in grown or candidate.log_posterior > grown[name].log_posterior:
-                    grown[name] = candidate
+                with suppress(ModelError):  # the fitted model without one of its effects has no finite response
+                    candidate = self._visit(state.with_fit(fit).with_effect(name, log_odds, state.fit))
+                    if name not in grown or candidate.log_posterior > grown[name].log_posterior:
+                        grown[name] = candidate
         return list(grown.values())
 
     def _with_faulty_parts(self, step: _WeighedState) -> Iterator[SearchState]:
@@ -317,7 +318,8 @@ class Search:
             if state.key - {name} in self._visited or not all(has_used_parameters(e, model) for e in model.records):
                 continue
             for fit in fit_rivals(self._start_rivals({name: model}, state.fit.data_sets, {})).values():
-                yield self._visit(self._with_fit(state, [e for e in state.effects if e != name], fit))
+                with suppress(ModelError):  # as in `_with_effects`
+                    yield self._visit(self._with_fit(state, [e for e in state.effects if e != name], fit))
 
     def _with_fit(self, state: SearchState, effects: Sequence[str], fit: FitResult) -> SearchState:
         """Build a state of the search from a fit of several effects.
@@ -351,8 +353,9 @@ class Search:
             state, start = states[n], leader.fit.model.values
             starts = self._start_rivals({"": state.fit.model}, state.fit.data_sets, start)
             for fit in fit_rivals(starts, state.free_columns(leader.likeliest_deviation)).values():
-                candidate = self._visit(self._with_fit(state, state.effects, fit))
-                states[n] = max(state, candidate, key=lambda rival: rival.log_posterior)
+                with suppress(ModelError):  # as in `_with_effects`
+                    candidate = self._visit(self._with_fit(state, state.effects, fit))
+                    states[n] = max(state, candidate, key=lambda rival: rival.log_posterior)
         return states
 
     def _corrected_records(self) -> Iterator[SearchState]:
