@@ -322,13 +322,7 @@ class Search:
                     yield self._visit(self._with_fit(state, [e for e in state.effects if e != name], fit))
 
     def _with_fit(self, state: SearchState, effects: Sequence[str], fit: FitResult) -> SearchState:
-        """Build a state of the search from a fit of several effects.
-
-        Args:
-            state: state with the tests.
-            effects: names of the effects, added one after the other.
-            fit: fit with all effects.
-        """
+        """Build a state of the search with the tests of `state`, from a fit of several effects, given by name."""
         fitted = SearchState.of_tests(state.tests).with_fit(fit)
         for name in effects:
             fitted = fitted.with_effect(name, self._log_odds("effect", name), fit)
