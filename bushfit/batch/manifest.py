@@ -113,12 +113,14 @@ class ManifestFile(RowSettings):
     """A TOML manifest; its settings apply to rows that do not state their own.
 
     Args:
+        name: name of the batch; default the name of the file.
         bushings: rows of the batch.
         at: operating points at which stiffness and loss factor are tabulated.
     """
 
     __pydantic_config__ = ConfigDict(extra="forbid")
 
+    name: Text | None = None
     bushings: Annotated[tuple[Entry, ...], Field(min_length=1)]
     at: tuple[PointText, ...] = ()
 
@@ -182,7 +184,8 @@ def read_manifest(source: str, settings: RowSettings, *more: str) -> Manifest:
         if has_sizes or not tables.keys().isdisjoint(("bushing", "specimens")):  # a campaign: a batch of one
             tables = {"bushings": [{"campaign": path.name}]}
         content = validate_tables(tables, path, ManifestFile)
-        settings, points, entries = settings.with_defaults(content), content.at, list(content.bushings)
+        settings, title, points = settings.with_defaults(content), content.name or title, content.at
+        entries = list(content.bushings)
     elif path.suffix.lower() in (".csv", ".tsv", ".txt"):
         entries = read_csv_entries(path)
     else:

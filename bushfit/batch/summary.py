@@ -290,15 +290,17 @@ class BatchResult:
             for part, record in zip(parts, self.records, strict=True)
             if not (part.poor_fit or record.verdict or _MISFITS.isdisjoint(part.warning_kinds))
         ]
+        too_narrow = [part.name for part in parts if "misfit" in part.warning_kinds]
+        included = f"the intervals include this deviation{f', except those of {listed(too_narrow)}' * bool(too_narrow)}"
         chi_square = self.estimates.get(FIT_QUALITY["reduced_chi_square"].name, np.full((1, 1), np.nan))[0]
         if len(parts) > 1 and np.all(chi_square >= BEYOND_NOISE):
             ends = format_range("", chi_square.min(), chi_square.max()).strip()
-            sentence = f"the model misses the tests of all {len(parts)} parts (reduced chi-square {ends})"
+            sentence = f"the model misses the tests of all {len(parts)} parts (reduced chi-square {ends}); {included}"
             advice = "look for a common cause, an effect or a mistake in the record: diagnose one part"
             warnings.append(Caveat("part_misfit", f"{sentence}: {advice}"))
         elif missing:
-            sentence = f"the tests of {listed(missing)} deviate from the model by more than noise explains"
-            warnings.append(Caveat("part_misfit", f"{sentence}: --command diagnose looks for the cause"))
+            sentence = f"the tests of {listed(missing)} deviate from the model by more than noise explains; {included}"
+            warnings.append(Caveat("part_misfit", f"{sentence}: bushfit batch --command diagnose looks for the cause"))
         fits = [rows[0] for name, rows in self.estimates.items() if name in FIT_NAMES or is_parameter(name)]
         equal_parts = defaultdict[tuple[str, ...], list[str]](list)
         for part, record, values in zip(parts, self.records, np.reshape(fits, (-1, len(parts))).T, strict=True):

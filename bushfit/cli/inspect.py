@@ -46,8 +46,6 @@ def command(files: tuple[Path, ...], test_options: Mapping[str, Any], output: Ou
     from bushfit.inspection.record import pasted_text, with_specimens_named
 
     sources, left_out = gather(files, test_options)
-    for reason in left_out:
-        output.print(f"left out: {reason}")
     last = math.ceil(len(sources) / _FILES_A_PICTURE)
     pages = ["inspect", *(f"inspect_{page}" for page in range(2, last + 1))]
     folder = output.folder(files[0].stem)
@@ -62,11 +60,12 @@ def command(files: tuple[Path, ...], test_options: Mapping[str, Any], output: Ou
                 errors.append(error)
             else:
                 left_out.append(Caveat("left_out", f"{error.problem} ({error.found})").about(source))
-                output.print(f"left out: {left_out[-1]}")
         except BushfitError as error:
             errors.append(error)
         else:
             print_inspection(output, inspections[-1])
+    for reason in left_out:
+        output.print(f"left out: {reason}")
     compared = with_contradictions(inspections)
     for alone, inspection in zip(inspections, compared, strict=True):
         for warning in inspection.odd[len(alone.odd) :]:

@@ -129,8 +129,6 @@ def _print_plan(output: Output, plan: Plan) -> None:
         enough = number(rivals["enough"], 3)
         output.print(f"  {enough} is enough in nine of ten cases; the standard programme reaches {standard}")
     else:
-        if "plan_model_error" in document["warning_kinds"]:
-            output.print("diagnose first, and plan from its model.json: no test reduces the error of the present model")
         output.print(f"{runs} reduce the standard error of the stiffness: {', '.join(gains)}")
     output.print(f"starting point: {document['source']}")
     tests, lines = plan.tests, []

@@ -160,7 +160,7 @@ def _print_static(output: Output, curve: StaticCurve) -> None:
     interval = f" (95 %: {low} to {high})" if low != high else ""
     output.print(
         f"{curve.label}: static {curve.direction.motion.words[2]} {secant} {name} from -{reach} to {reach} at "
-        f"{curve.rate_text}{interval}, {slope} {name} at zero displacement"
+        f"{curve.rate_text}{interval}; slope of the static curve at zero displacement {slope} {name}"
     )
 
 

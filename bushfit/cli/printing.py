@@ -70,7 +70,7 @@ def print_result(output: Output, title: str, result: Result) -> None:
     print_parameters(output, title, result)
     if quality := result.quality:
         gain = quality.loop_gain_error
-        of_loops = " (of a loop, only the first harmonic counts)" if result.model.unnamed and gain else ""
+        of_loops = " (of a loop, the first harmonic; in chi2 below, all rows)" if result.model.unnamed and gain else ""
         loops = f", gain error of a loop {number(100 * gain, 2)} % ([rig] gain_error)" if gain else ""
         output.print(
             f"NRMSE {number(100 * quality.nrmse, 2)} %, reduced chi-square {number(quality.reduced_chi_square, 3)} "

@@ -69,9 +69,7 @@ def model_file(path: Path) -> Path:
 
 def load_source(path: Path) -> Campaign | Result:
     """Load a campaign file, a model file, or the model of a results folder."""
-    if path.suffix.lower() == ".toml" and not path.is_dir():
-        return load_campaign(path)
-    return load_model(path)
+    return load_campaign(path) if path.suffix.lower() == ".toml" and not path.is_dir() else load_model(path)
 
 
 def model_source(path: Path) -> Source:

@@ -322,7 +322,7 @@ def format_odds(document: Mapping[str, Any]) -> list[str]:
         lines = [f"Probability that nothing is missing: {format_probability(document['nothing'])}."]
         if 1.0 - document["nothing"] > _LEAST_REPORTED:
             small = format_probability(1.0 - document["nothing"])
-            lines.append(f"Probability of an effect too small for these tests to show: {small}.")
+            lines.append(f"Probability of an effect that these tests do not establish: {small}.")
         return lines
     lines = [f"probability {format_probability(entry['probability'])}: {entry['words']}" for entry in document["odds"]]
     rest = 1.0 - sum(entry["probability"] for entry in document["odds"])

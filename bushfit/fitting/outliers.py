@@ -195,9 +195,7 @@ def misfit_scale(distance: Array, parts: int) -> float:
         distance: distance of each point in units of noise, (n,).
         parts: number of components of a point: 1 for a force, 2 for a complex stiffness.
     """
-    if not distance.size:
-        return 1.0
-    return max(1.0, float(np.median(distance) / np.sqrt(chdtri(parts, 0.5))))
+    return max(1.0, float(np.median(distance) / np.sqrt(chdtri(parts, 0.5)))) if distance.size else 1.0
 
 
 def _difference_from_neighbours(values: Array, starts: Array, window: int) -> Array:

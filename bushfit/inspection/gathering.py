@@ -158,7 +158,10 @@ def split_sheets(file: TestSource, test_options: Mapping[str, Any], left_out: li
     tests, failed = list[TestSource](), dict[str | None, Caveat]()
     for part in distribute_options(parts, test_options):
         try:
-            recognize_table(part.file, part.test_options)
+            try:
+                recognize_table(part.file, part.test_options)
+            except NoColumnError:  # the stated column may be one of another file
+                recognize_table(part.file, part.without("columns").test_options)
         except NoTestError as error:
             why = f"{error.problem} ({error.found})" if error.found else f"{error.problem}; {error.hint}"
             kind = "to_reduce" if isinstance(error, ResonanceTestError) else "left_out"

@@ -215,7 +215,7 @@ def campaigns_of_parts(
     if unknown := of_parts.pop("", []):
         found = f"specimens {', '.join(of_parts)} in other files"
         raise CampaignError(**ERRORS["no_specimen_number"], file=unknown[0].file, found=found)
-    texts = {listed_in: f"# a campaign of each part: bushfit batch {listed_in}\n"}
+    texts = {listed_in: f"# a campaign of each part: bushfit batch {listed_in}\n{''.join(key_lines({'name': name}))}\n"}
     for number, (part, tests) in enumerate(of_parts.items(), start=1):
         file = f"{folder_name(part)}.toml"
         file = f"{number}_{file}" if file.casefold() in map(str.casefold, texts) else file

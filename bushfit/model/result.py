@@ -354,10 +354,10 @@ class Result:
 
     @property
     def possible_causes(self) -> list[str]:
-        """Effects that the model lacks and the tests do not rule out, such as "delay with inertia"."""
-        rivals = (one.model for one in self.alternatives if not {*one.model.effects} <= {*self.model.effects})
-        effects = ([name for name in model.effects if name not in (*BASE, UNNAMED)] for model in rivals)
-        return list(dict.fromkeys(" with ".join(added) for added in effects))
+        """Effects that the model lacks and the tests do not rule out, such as "delay with inertia (4 %)"."""
+        rivals = (rival for rival in self.alternatives if not {*rival.model.effects} <= {*self.model.effects})
+        added = (([name for name in one.model.effects if name not in (*BASE, UNNAMED)], one) for one in rivals)
+        return [f"{' with '.join(names)} ({100.0 * rival.probability:.0f} %)" for names, rival in added]
 
     @property
     def fitted_places(self) -> list[Place]:

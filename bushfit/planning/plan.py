@@ -214,8 +214,7 @@ def plan_warnings(search: PlanSearch) -> Iterator[Caveat]:
     model_error = max((float(quantity.model_error.max()) for quantity in stiffnesses), default=0.0)
     if model_error > _NOTABLE_RATIO - 1.0 and not knowledge.rivals:
         sentence = f"the errors of the stiffness include the model error, up to {number(100.0 * model_error, 2)} %"
-        advice = "bushfit diagnose looks for the missing effect; to plan with it, give its model.json to bushfit plan"
-        yield Caveat("plan_model_error", f"{sentence}, which further tests do not reduce. {advice}")
+        yield Caveat("plan_model_error", f"{sentence}, which the planned tests do not reduce")
     yield from knowledge.result.warnings
     if knowledge.bounded:
         sentence = f"{join_names(knowledge.bounded)} ended at a bound: the planned errors of the other parameters"

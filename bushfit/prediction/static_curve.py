@@ -13,7 +13,7 @@ from bushfit.geometry import Place
 from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.model.sensitivity import force_and_slopes
-from bushfit.prediction.bands import Band, envelope, uncertainty
+from bushfit.prediction.bands import Band, Uncertainty, envelope, expected_error, uncertainty
 from bushfit.prediction.caveats import extrapolations
 from bushfit.prediction.conditions import OperatingPoints, PredictedPlace, rubber_conditions
 from bushfit.prediction.superposed import correction_factor, models_with_time_law
@@ -114,35 +114,31 @@ def static_curve(
     models, untimed = models_with_time_law(result, f"{place}, static curve")
     displacement = np.linspace(-reach, reach, _POINTS)
     conditions = rubber_conditions(result, place, temperature, preload)
-    parts = [_forces(source, model, place, displacement, rate, conditions) for source, model in models]
-    loading, unloading, mean, slope, secant = (envelope(bands) for bands in zip(*parts, strict=True))
     point = OperatingPoints(place, np.array([rate / (4.0 * reach)]), np.array([reach]), conditions)
+    parts = [_forces(model, uncertainty(source, model, point), point, displacement) for source, model in models]
+    if result.model.unnamed:  # the mean force has no part out of phase, so the error of the loss factor does not matter
+        parts.append(_forces(models[0][1], expected_error(result, place, np.zeros(1)), point, displacement))
+    loading, unloading, mean, slope, secant = (envelope(bands) for bands in zip(*parts, strict=True))
     warnings = (*extrapolations(result, point, f"{place}, static curve"), *untimed)
     return StaticCurve(place, displacement, loading, unloading, mean, slope, secant, rate, warnings, conditions)
 
 
-def _forces(
-    result: Result, model: Model, place: Place, displacement: Array, rate: float, conditions: RubberConditions
-) -> list[Band]:
+def _forces(model: Model, errors: Uncertainty, point: OperatingPoints, displacement: Array) -> list[Band]:
     """Bands of the static curve of one model, in the steady state of a slow triangular motion.
 
     Args:
-        result: fitted result, which contains the errors.
         model: the fitted model or a variant with other effects.
-        place: direction or specimen.
+        errors: errors of the parameters, and of the model itself, at `point`.
+        point: direction or specimen, frequency and amplitude of the motion, and conditions of the rubber.
         displacement: evenly spaced displacements from -reach to reach [m, rad or 1], (n,).
-        rate: rate of the motion [m/s, rad/s or 1/s].
-        conditions: temperature and preload of the rubber.
 
     Returns:
         Loading force, unloading force, their mean and its slope (d mean/d displacement), (n,) each, and secant, (1,).
     """
     strokes = np.linspace(displacement[0], displacement[-1], _SAMPLES * (_POINTS - 1) + 1)
-    frequency = rate / (4.0 * displacement[-1])
-    cycle = History.steady(np.concatenate((strokes, strokes[-2:0:-1])), frequency)
-    point = OperatingPoints(place, np.array([frequency]), displacement[-1:], conditions)
-    errors = uncertainty(result, model, point)
-    force, slopes = force_and_slopes(model.without(UNNAMED), place, cycle, errors.covariance.names, conditions)
+    cycle = History.steady(np.concatenate((strokes, strokes[-2:0:-1])), float(point.frequency[0]))
+    names, (place, *_, conditions) = errors.covariance.names, point
+    force, slopes = force_and_slopes(model.without(UNNAMED), place, cycle, names, conditions)
     changes = np.concatenate((force[None], slopes, errors.relative.real * force))
     if model.unnamed:  # as in a sine of the same frequency and amplitude
         changes *= np.abs(correction_factor(model, point))

@@ -61,14 +61,11 @@ def is_unit_alone(header: str, vocabulary: Vocabulary) -> bool:
     return bool(name and unit) and unit != "-" and vocabulary.heading(header) is None and units.is_unit(unit or "")
 
 
-def with_conversions(roles: set[str]) -> set[str]:
-    """Add the roles that columns of some roles can take, such as "loss_factor" for a "damping_ratio"."""
-    return roles | {CONVERSIONS[role][0] for role in roles & CONVERSIONS.keys()}
-
-
 def is_test(roles: set[str]) -> bool:
     """Return True if columns of these roles are those of a loop or sweep; a force may be read as its amplitude."""
-    roles = with_conversions(roles)
+    roles = roles | {
+        CONVERSIONS[role][0] for role in roles & CONVERSIONS.keys()
+    }  # such as loss_factor of damping_ratio
     is_loop = "displacement" in roles and not roles.isdisjoint(("force", "force_amplitude"))
     return is_loop or (not roles.isdisjoint(_LEVELS[:2]) and any(set(pair) <= roles for pair in PAIRS))
 

@@ -21,7 +21,7 @@ _MEASURED = re.compile(
 #: What the numbers may be used for, by the verdict of a diagnosis.
 _WITH_BANDS = "Use stiffness and loss within the tested range, with their 95 % bands."
 _USES = {
-    "consistent": "The model agrees with the tests within their noise. Use the model within the tested range.",
+    "consistent": "Use the model within the tested range, with its 95 % bands.",
     "named": "Use the model, which includes the named effect, within the tested range.",
     "ambiguous": f"{_WITH_BANDS} Do not state one cause yet.",
     "described": f"{_WITH_BANDS} The cause is not known.",

@@ -41,9 +41,9 @@ def middle_point(result: Result, prediction: Prediction) -> Prediction:
 def headline_texts(result: Result, point: Prediction) -> dict[str, str]:
     """Key values of a direction or specimen for the top of a report, as texts.
 
-    The static stiffness is that of the static curve to the same amplitude, if a test was made
-    at 1 Hz or below and the model has a law in time. The dynamic stiffening is the ratio of dynamic to static
-    stiffness; its interval includes the correlation of the two.
+    The static stiffness is that of the static curve to the same amplitude, if a test was made at 1 Hz or below and the
+    model has a law in time. The dynamic stiffening is the ratio of dynamic to static stiffness; its band assumes common
+    errors of the parameters, and independent errors of the model.
 
     Args:
         result: final model.
@@ -78,18 +78,19 @@ def headline_texts(result: Result, point: Prediction) -> dict[str, str]:
         "static_band": "",
         "static_point": f"lowest frequency {number(lowest, 3)} Hz",
         "stiffening": "",
+        "stiffening_band": "",
     }
     if lowest < frequency and lowest <= _STATIC and not untimed_effects(result.model):
         curve = static_curve(result, place, amplitude, static_rate(result, place))
-        static, ratio = band_at(curve.secant, 0, to_unit), float(point.stiffness.value[0] / curve.secant.value[0])
-        relative = [band.root[:, 0] / band.value[0] for band in (point.stiffness, curve.secant)]
-        # the errors of a smooth correction differ between the two frequencies
-        spread = np.concatenate(relative) if result.model.unnamed else relative[0] - relative[1]
-        half = Z95 * ratio * float(np.linalg.norm(spread))
+        static, (high, low) = band_at(curve.secant, 0, to_unit), map(Band.logarithm, (point.stiffness, curve.secant))
+        ratio = high.minus(low)
+        if not (result.model.unnamed or result.model_error or result.alternatives):  # only parameters, the same in both
+            half = Z95 * np.linalg.norm(high.root - low.root, axis=0)
+            ratio = Band(ratio.value, ratio.value - half, ratio.value + half)
+        stiffening = np.exp(ratio.ends[:, 0]).tolist()
         row |= {"static": f"{format_aligned(static[:1], 4)[0]} {unit}", "static_band": format_interval(static)}
-        row["static_point"] = f"at {curve.rate_text}"
-        decimals = max(2, math.ceil(-math.log10(2.0 * half))) if half else 2  # the interval is not rounded to 0
-        row["stiffening"] = f"{ratio:.{decimals}f}" + (f" ± {half:.{decimals}f}" if half else "")
+        row |= {"static_point": f"at {curve.rate_text}", "stiffening_band": format_interval(stiffening)}
+        row["stiffening"] = format_aligned(stiffening[:1], 4)[0]
     return row
 
 
