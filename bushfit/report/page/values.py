@@ -8,7 +8,7 @@ import numpy as np
 from bushfit.effects.contract import Array
 from bushfit.model.covariance import Z95
 from bushfit.model.result import Result
-from bushfit.prediction.bands import Band
+from bushfit.prediction.bands import Band, agreeing_models
 from bushfit.prediction.caveats import MARGIN
 from bushfit.prediction.static_curve import static_curve, static_rate
 from bushfit.prediction.stiffness import Prediction, predict
@@ -84,7 +84,9 @@ def headline_texts(result: Result, point: Prediction) -> dict[str, str]:
         curve = static_curve(result, place, amplitude, static_rate(result, place))
         static, (high, low) = band_at(curve.secant, 0, to_unit), map(Band.logarithm, (point.stiffness, curve.secant))
         ratio = high.minus(low)
-        if not (result.model.unnamed or result.model_error or result.alternatives):  # only parameters, the same in both
+        if len(agreeing_models(result)) == 1 and not (
+            result.model.unnamed or result.model_error
+        ):  # common errors alone
             half = Z95 * np.linalg.norm(high.root - low.root, axis=0)
             ratio = Band(ratio.value, ratio.value - half, ratio.value + half)
         stiffening = np.exp(ratio.ends[:, 0]).tolist()
