@@ -84,9 +84,8 @@ def headline_texts(result: Result, point: Prediction) -> dict[str, str]:
         curve = static_curve(result, place, amplitude, static_rate(result, place))
         static, (high, low) = band_at(curve.secant, 0, to_unit), map(Band.logarithm, (point.stiffness, curve.secant))
         ratio = high.minus(low)
-        if len(agreeing_models(result)) == 1 and not (
-            result.model.unnamed or result.model_error
-        ):  # common errors alone
+        if not (result.model.unnamed or result.model_error) and len(agreeing_models(result)) == 1:
+            # the parameters alone are uncertain, and their errors are common to both
             half = Z95 * np.linalg.norm(high.root - low.root, axis=0)
             ratio = Band(ratio.value, ratio.value - half, ratio.value + half)
         stiffening = np.exp(ratio.ends[:, 0]).tolist()
