@@ -118,8 +118,8 @@ def si_column(table: Table, role: str, tested: Place, hint: str | None = None) -
     if is_foreign and role in OF_MOTION and "force" not in role:
         refuse_other_motion(table, role, [column.header])
     next_step = None
-    if not units.is_unit(unit):
-        size = unit if units.is_unit(_MULTIPLE.sub("", unit).strip()) else f"... {example}"
+    if not units.is_unit(unit) or "count" in unit.lower():
+        size = unit if _MULTIPLE.match(unit) and units.is_unit(_MULTIPLE.sub("", unit).strip()) else f"... {example}"
         next_step = f'state the size of one "{unit}": units = {{ {role} = "{size}" }} in the campaign'
     with error_location(table.file, place, next_step):
         if expected == "Hz" and is_angular(column.header, unit):
