@@ -38,8 +38,8 @@ class Composition:
     Args:
         probability: probability of these components, given that something is missing in the model.
         best: most probable hypothesis with these components.
-        names: effects in the set. If the set includes a smooth deviation of the rubber, effects of the rubber are not
-            listed, because the deviation includes them.
+        names: effects in the set. If the set includes a smooth deviation of the rubber, or a curve without a name,
+            effects of the rubber are not listed, because the deviation includes them.
         unnamed: True if an unnamed smooth curve, or a deviation of the compound, is part of the explanation.
     """
 
@@ -202,11 +202,12 @@ def _leads(pairs: Sequence[tuple[Hypothesis, float]]) -> tuple[str, ...]:
 def _components_of(hypothesis: Hypothesis) -> frozenset[_Component]:
     """Components of a hypothesis; hypotheses with equal components are merged into one explanation.
 
-    Effects of the rubber are not listed if a deviation of the compound, or errors of levels, could imitate them. A
-    deviation, a function of frequency and strain, cannot imitate effects of temperature and preload. A curve without a
-    name, or a pattern of faulty parts of the tests, is listed only if there is nothing else.
+    Effects of the rubber are not listed if a deviation of the compound, another curve without a name, or errors of
+    levels could imitate them. A deviation, a function of frequency and strain, cannot imitate effects of temperature
+    and preload. A curve without a name, or a pattern of faulty parts of the tests, is listed only if there is nothing
+    else.
     """
-    nameless = Level.MATERIAL if hypothesis.compound_deviates or hypothesis.has_level_errors else None
+    nameless = Level.MATERIAL if hypothesis.unnamed or hypothesis.has_level_errors else None
     separable = () if hypothesis.has_level_errors else _CONDITIONS
     effects = [(name, get_effect(name)) for name in hypothesis.effects]
     listed = [name for name, effect in effects if effect.level != nameless or {*effect.depends_on} & {*separable}]
