@@ -55,7 +55,7 @@ def test_a_file_is_run_only_with_permission_and_only_as_it_was(bushfit, root, tm
     bushfit(*predict, "--trust")
     law.write_text(law.read_text(encoding="utf-8") + "# changed\n", encoding="utf-8")
     changed = bushfit(*predict, "--force", "--trust", status=2).stderr
-    assert "not the one that the model was fitted with" in changed
+    assert "has changed since the model was fitted" in changed
 
 
 @pytest.mark.parametrize(

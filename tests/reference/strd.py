@@ -30,7 +30,7 @@ class Curve:
     parameters: Mapping[str, Parameter]
     effects: tuple[str, ...] = ()
     constraints: Constraints = UNCONSTRAINED
-    tied: tuple[str, ...] = ()
+    tied_names: tuple[str, ...] = ()
 
     def with_values(self, values: Mapping[str, float]) -> Curve:
         return replace(self, values={**self.values, **values})
