@@ -8,7 +8,6 @@ from pydantic import AfterValidator, Field
 
 from bushfit.errors import CampaignError, ModelError
 from bushfit.geometry import Bushing, CouponKind, Direction, Shape, Specimen, StatedStrain
-from bushfit.reading.headers import ERRORS
 from bushfit.validation import Count, Length, Name, si
 
 
@@ -19,7 +18,8 @@ def _check_name(name: str) -> str:
         ValueError: a direction, or another table in the results folder, has this name.
     """
     if name in (*Direction, "loops", "sweeps", "gap", "candidates", "measured", "shear"):
-        raise ValueError(CampaignError(**ERRORS["name_of_table"], found=name))
+        expected = "a unique name, because the tables are named after it"
+        raise ValueError(CampaignError("another table has this name", found=name, expected=expected))
     return name
 
 

@@ -26,7 +26,7 @@ from bushfit.model.model import FIVE, Model
 from bushfit.model.transfer import FACTOR_SPREAD
 from bushfit.progress import track
 from bushfit.reading.finding import direction_of_table, find_table
-from bushfit.reading.headers import ERRORS, LOOP_COLUMNS, SWEEP_COLUMNS, ZERO_TO_PEAK, split_convention
+from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS, ZERO_TO_PEAK, split_convention
 from bushfit.reading.instruments import RECORDINGS
 from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import AnyTest, Loop, Sweep
@@ -103,7 +103,12 @@ def load_campaign(path: str | Path) -> Campaign:
     refuse_tests([path])
     content = _read_file(path)
     if not (content.loops or content.sweeps or content.simulate or content.compound):
-        raise CampaignError(**ERRORS["no_tests"], file=path)
+        raise CampaignError(
+            "the campaign has no tests",
+            expected="[[loops]] or [[sweeps]] tables, or a [simulate] or a [compound] table",
+            hint='add [[loops]] with file = "..." and direction = "axial"',
+            file=path,
+        )
     with error_location(path):
         bushing = content.bushing.to_bushing() if content.bushing else None
         specimens = tuple(specimens_of(content.bushings, content.specimens))
@@ -184,7 +189,8 @@ def load_bushing(path: Path) -> Bushing:
     """
     table = _read_file(path).bushing
     if table is None:
-        raise CampaignError(**ERRORS["no_bushing"], file=path)
+        expected = "a [bushing] table with name, inner_radius, outer_radius and length"
+        raise CampaignError("the file has no [bushing] table", file=path, expected=expected)
     with error_location(path):
         return table.to_bushing()
 
@@ -193,9 +199,11 @@ def _check_bodies(content: CampaignFile) -> None:
     """Raise a CampaignError for missing or repeated bodies, [bushing] and [[bushings]], or bushings without tests."""
     names = [*(table.name for table in content.bushings), *(table.name for table in content.specimens)]
     if not (content.bushing or names):
-        raise CampaignError(**ERRORS["no_body"])
+        expected = "[bushing] with its name, radii and length, [[bushings]] or [[specimens]]"
+        raise CampaignError("the campaign does not state what was tested", expected=expected)
     if content.bushing and content.bushings:
-        raise CampaignError(**ERRORS["two_lists"])
+        expected = "[bushing] for one bushing, or [[bushings]] for several of one compound"
+        raise CampaignError("two lists of bushings", found="[bushing] and [[bushings]]", expected=expected)
     all_names = [*names, *(f"{table.name} {axis}" for table in content.bushings for axis in Direction)]
     if doubles := {name for name in all_names if all_names.count(name) > 1}:
         table = "[[bushings]]" if content.bushings else "[[specimens]]"
@@ -204,7 +212,8 @@ def _check_bodies(content: CampaignFile) -> None:
     untested = [table.name for table in content.bushings if table.name not in tested]
     if tested and untested and tested <= {*names}:  # a test of no body is refused where it is read
         expected = f'a test with bushing = "{untested[0]}"'
-        raise CampaignError(**ERRORS["untested_bushing"], found=untested[0], expected=expected)
+        hint = "bushfit predict --bushing FILE predicts a bushing that was not tested from its [bushing] in a file"
+        raise CampaignError("a bushing has no tests", found=untested[0], expected=expected, hint=hint)
 
 
 def _check_places(content: CampaignFile, specimens: Sequence[Specimen]) -> None:
@@ -236,7 +245,12 @@ def model_of(campaign: Campaign) -> Model:
         ModelError: an unknown effect or an impossible value.
     """
     if campaign.simulate is None:
-        raise CampaignError(**ERRORS["nothing_to_simulate"], file=campaign.path)
+        raise CampaignError(
+            "the campaign does not state what to simulate",
+            expected="a [simulate] table that states the material parameters",
+            hint="or fit the campaign first and simulate its model.json",
+            file=campaign.path,
+        )
     values = campaign.simulate.parameters
     missing = [name for name in FIVE if name not in values]
     if missing:
@@ -272,7 +286,8 @@ def refuse_tests(paths: Sequence[Path]) -> None:
         )
     if campaigns:
         hint = f"give the campaign of the folder: {' or '.join(campaigns)}"
-    raise CampaignError(**ERRORS["no_campaign"], file=[*tests, model][0], found=found, hint=hint)
+    expected = "a .toml file that names the bushing and its tests"
+    raise CampaignError("a campaign is needed", file=[*tests, model][0], found=found, expected=expected, hint=hint)
 
 
 def reader_keywords(

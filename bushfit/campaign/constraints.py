@@ -15,7 +15,6 @@ from bushfit.geometry import get_places
 from bushfit.model.constraints import Constraints, Prior, Tie
 from bushfit.model.file import load_result
 from bushfit.model.result import Result
-from bushfit.reading.headers import ERRORS
 from bushfit.validation import unknown_key
 
 #: Number of a prior, and its value and standard deviation, each with a unit; one unit may serve both.
@@ -64,14 +63,16 @@ def _require_compatible_keys(setting: ParameterSetting) -> None:
     keys += ["vary = false"] * (not setting.vary and bool(keys or setting.prior))
     if len(keys) > 1 or (setting.prior and not setting.vary):
         found = ", ".join([*keys, *(["prior"] * bool(setting.prior))])
-        raise CampaignError(**ERRORS["exclusive_keys"], found=found)
+        expected = "equal or expression as the only key, or a prior of a parameter that varies"
+        raise CampaignError("these keys exclude each other", found=found, expected=expected)
 
 
 def _prior(text: str, name: str) -> Prior:
     """Parse a prior of one parameter, such as "0.24 +- 0.03" (value and standard deviation)."""
     match = _PLUS_MINUS.fullmatch(text)
     if not match or (match[4] == "%" and not match[2]):  # 3 % may be of the value, or added to it
-        raise CampaignError(**ERRORS["not_a_prior"], found=f'"{text}"')
+        expected = '"0.24 +- 0.03" (with a unit if the parameter has one), or the model.json of an earlier fit'
+        raise CampaignError("this is not a prior", found=f'"{text}"', expected=expected)
     parameter = get_parameter(name)
     parts = (match[1], match[2] or match[4]), (match[3], match[4])
     mean, deviation = (
@@ -100,7 +101,8 @@ def _prior_from_result(
     sources = [loop.source for loop in campaign.loops] + [sweep.source for sweep in campaign.sweeps]
     hashes = {source.sha256 for source in sources if source}
     if twice := [file for file, sha256 in result.files.items() if sha256 in hashes]:
-        raise CampaignError(**ERRORS["prior_of_same_tests"], found=", ".join(twice))
+        expected = "a model fitted to other tests: a test that is used twice makes intervals too narrow"
+        raise CampaignError("the prior was fitted to tests of this campaign", found=", ".join(twice), expected=expected)
     names = [name for name in result.fitted if name not in result.at_bound and name not in without]
     names = [name for name in names if only in (None, name) and result.covariance.stderr(name)]
     if not names:
@@ -143,5 +145,6 @@ def _ties(campaign: Campaign) -> list[Tie]:
         order = [*TopologicalSorter({name: ties.keys() & {*tie.names} for name, tie in ties.items()}).static_order()]
     except CycleError as error:
         circle = ", ".join(f"{name} = {ties[name].expression}" for name in error.args[1][:0:-1])
-        raise CampaignError(**ERRORS["circle_of_ties"], found=circle) from None
+        expected = "one that is free"
+        raise CampaignError("parameters are tied in a circle", place="fit", found=circle, expected=expected) from None
     return [ties[name] for name in order]

@@ -11,7 +11,6 @@ from bushfit.campaign.quantities import convert_effect, parameter_value
 from bushfit.effects.contract import Array
 from bushfit.errors import CampaignError
 from bushfit.geometry import TRANSLATION, Place
-from bushfit.reading.headers import ERRORS
 from bushfit.reading.measurement import Stepped, Waveform
 from bushfit.reading.preload import Preload, parse_preload
 from bushfit.reading.resonance import FEWEST_ROWS
@@ -146,7 +145,8 @@ class SimulatedResonance(SimulatedTest):
 
     def __post_init__(self) -> None:
         if self.direction.motion is not TRANSLATION:
-            raise ValueError(CampaignError(**ERRORS["mass_that_turns"], found=str(self.direction)))
+            expected = "a direction with a displacement, or a specimen in shear"
+            raise ValueError(CampaignError("a mass needs a translation", found=str(self.direction), expected=expected))
         usable = [f for f in self.frequencies if 1.0 / LARGEST_SHAKEN <= f <= LARGEST_SHAKEN]
         if len(usable) < max(FEWEST_ROWS, len(self.frequencies)):
             expected = f"at least {FEWEST_ROWS}, from below to above the resonance"
@@ -177,7 +177,8 @@ class SimulatedRecord(SimulatedTest):
         needed = 0 if self.motion == "road" else len(self.frequencies)
         if len(self.amplitudes) != needed or (self.rms is None) != (self.motion == "sines"):
             found = f"{len(self.amplitudes)} amplitudes, {'no' if self.rms is None else 'an'} rms"
-            raise ValueError(CampaignError(**ERRORS["no_motion"], found=found))
+            expected = "an amplitude for each frequency of sines and random, and rms for random and road"
+            raise ValueError(CampaignError("these keys do not describe a motion", found=found, expected=expected))
         if min(np.diff(self.frequencies), default=self.motion == "sines") <= 0.0:
             raise ValueError(CampaignError("this is not a frequency band", expected="two or more, ascending"))
 

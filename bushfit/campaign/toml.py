@@ -9,7 +9,6 @@ from typing import Any
 from bushfit.errors import CONTROL, CampaignError
 from bushfit.geometry import Specimen
 from bushfit.reading.files import line_of, read_utf8
-from bushfit.reading.headers import ERRORS
 
 #: A key of more than 16 parts, such as a.b.c; parsing one takes time in proportion to the square of their number.
 _DEEP_KEY = re.compile(rb"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){16}""")
@@ -60,7 +59,8 @@ def parse_toml(path: Path, description: str = "a campaign file", largest: int = 
         pass
     place = line_of(data, chain.start()) if chain else None
     # outside of `except`: an error of a thousand frames cannot be pickled
-    raise CampaignError(**ERRORS["nested_tables"], file=path, place=place)
+    expected = "keys of a few parts, such as simulate.effects.inertia.mass"
+    raise CampaignError("the tables are nested too deeply", file=path, place=place, expected=expected)
 
 
 def specimen_lines(specimen: Specimen) -> list[str]:
