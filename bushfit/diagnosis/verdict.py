@@ -202,17 +202,17 @@ def _leads(pairs: Sequence[tuple[Hypothesis, float]]) -> tuple[str, ...]:
 def _components_of(hypothesis: Hypothesis) -> frozenset[_Component]:
     """Components of a hypothesis; hypotheses with equal components are merged into one explanation.
 
-    Effects of the rubber are not listed if a deviation of the compound, another curve without a name, or errors of
-    levels could imitate them. A deviation, a function of frequency and strain, cannot imitate effects of temperature
-    and preload. A curve without a name, or a pattern of faulty parts of the tests, is listed only if there is nothing
-    else.
+    Effects of the rubber are not listed if a deviation of the compound, another curve without a name, a pattern of
+    faulty parts, or errors of levels could imitate them. A deviation, a function of frequency and strain, cannot
+    imitate effects of temperature and preload. A curve without a name, or a pattern of faulty parts of the tests, is
+    listed only if there is nothing else.
     """
-    nameless = Level.MATERIAL if hypothesis.unnamed or hypothesis.has_level_errors else None
+    pattern = is_pattern(hypothesis.faulty_parts)
+    nameless = Level.MATERIAL if hypothesis.unnamed or pattern or hypothesis.has_level_errors else None
     separable = () if hypothesis.has_level_errors else _CONDITIONS
     effects = [(name, get_effect(name)) for name in hypothesis.effects]
     listed = [name for name, effect in effects if effect.level != nameless or {*effect.depends_on} & {*separable}]
     components: list[_Component] = [("effect", name) for name in listed]
-    pattern = is_pattern(hypothesis.faulty_parts)
     if not pattern:
         components += [(f"{_FAULT}{part.family}", part.name) for part in hypothesis.faulty_parts]
         components += [(f"{_FAULT}levels", "")] * hypothesis.has_level_errors
