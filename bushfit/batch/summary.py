@@ -205,8 +205,8 @@ class BatchResult:
         if name in self.compared_values:
             compared = self.compared_values[name][0]
             limit = smallest_deviation(int(np.isfinite(compared).sum()), len(self.compared_values))
-            usual = reference_parts(compared, name, self.outliers)
-            detectable = limit and limit * float(values[usual].std(ddof=1))
+            reference = reference_parts(compared, name, self.outliers)
+            detectable = limit and limit * float(values[reference].std(ddof=1))
         bounds = self.plan.limits.bounds.get(name) if self.plan.limits and name not in FIT_NAMES else None
         low, high = self.allowed.get(name, (-np.inf, np.inf))
         fixed = bounds.fixed_limits if bounds else (-np.inf, np.inf)

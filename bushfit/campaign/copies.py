@@ -7,6 +7,7 @@ if they agree within the last decimal place, in the unit of the file, of the num
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import cache
 from itertools import chain, combinations_with_replacement
 from typing import Any, NamedTuple
 
@@ -28,9 +29,14 @@ _ROUNDING = 1e-4
 _Run = tuple[int, Any]
 #: Number of rows, evenly spread, that show the last decimal place of a column; chosen: one number in ten ends in 0.
 _ROWS = 100
-#: SI factors of the units of files, apart from powers of ten.
-_NAMES = ("m", "in", "lbf", "lbf/in", "psi", "kgf", "lbf*in", "lbf*ft", "deg", "min")
-_UNITS = np.array([si_factor(unit, unit) for unit in _NAMES])
+#: Units of files, apart from powers of ten.
+_UNITS = ("m", "in", "lbf", "lbf/in", "psi", "kgf", "lbf*in", "lbf*ft", "deg", "min")
+
+
+@cache
+def _unit_factors() -> Array:
+    """SI factors of `_UNITS`, (units,)."""
+    return np.array([si_factor(unit, unit) for unit in _UNITS])
 
 
 class _Rows(NamedTuple):
@@ -46,15 +52,15 @@ class _Rows(NamedTuple):
     @classmethod
     def of_columns(cls, *columns: Array) -> "_Rows":
         """Build the rows from c columns in SI, (n,) each, which contain the fewest digits in the unit of the file."""
-        numbers = np.stack(columns)
-        largest = np.abs(numbers).max(axis=1, keepdims=True).clip(min=1e-300) / _UNITS
-        places = _UNITS * 10.0 ** (np.floor(np.log10(largest))[:, None] + 1.0 - np.arange(*_DIGITS)[:, None])
+        numbers, factors = np.stack(columns), _unit_factors()
+        largest = np.abs(numbers).max(axis=1, keepdims=True).clip(min=1e-300) / factors
+        places = factors * 10.0 ** (np.floor(np.log10(largest))[:, None] + 1.0 - np.arange(*_DIGITS)[:, None])
         in_places = numbers[:, None, None, :: numbers.shape[1] // _ROWS + 1] / places[..., None]
         is_decimal = np.all(np.abs(in_places - np.round(in_places)) < _ROUNDING, axis=-1)
         is_decimal[:, -1, 0] = True
         first = is_decimal.reshape(len(numbers), -1).argmax(axis=1)[:, None]
         places = np.take_along_axis(places.reshape(len(numbers), -1), first, axis=1)
-        return cls(numbers, 0.5 * places, _UNITS[first % len(_UNITS)])
+        return cls(numbers, 0.5 * places, factors[first % factors.size])
 
     def tolerance(self, copy: "_Rows") -> Array:
         """Largest difference of equal numbers of two tests by column, (c, 1): both are rounded if the units differ."""
@@ -104,10 +110,12 @@ def copied_points(sweeps: Sequence[Sweep]) -> dict[tuple[int, int], list[int]]:
     Returns:
         Indices of the copied rows of a sweep, by the indices of this sweep and of the sweep with the original rows.
     """
-    levels = [zip(sweep.repeat.tolist(), sweep.run_level.tolist(), strict=True) for sweep in sweeps]
-    run_of: list[list[_Run]] = [
-        [(index, level if sweep.stepped else None) for level in levels[index]] for index, sweep in enumerate(sweeps)
-    ]
+    runs, run_of = defaultdict[_Run, list[int]](list), list[list[_Run]]()
+    for index, sweep in enumerate(sweeps):
+        levels = zip(sweep.repeat.tolist(), sweep.run_level.tolist(), strict=True)
+        run_of.append([(index, level if sweep.stepped else None) for level in levels])
+        for row, run in enumerate(run_of[-1]):
+            runs[run].append(row)
     twins = [[set[_Run]() for _ in of_rows] for of_rows in run_of]
     copies: defaultdict[tuple[int, int], set[int]] = defaultdict(set)
     forms = [_forms(sweep) for sweep in sweeps]
@@ -119,9 +127,8 @@ def copied_points(sweeps: Sequence[Sweep]) -> dict[tuple[int, int], list[int]]:
                 if row < twin and run_of[first][row] == run_of[second][twin]:
                     copies[first, first].add(twin)
     copied = set[_Run]()
-    for run in reversed(dict.fromkeys(chain.from_iterable(run_of))):
+    for run, rows in reversed(runs.items()):
         index = run[0]
-        rows = [row for row, run_of_row in enumerate(run_of[index]) if run_of_row == run]
         equal_runs = (twins[index][row] - {run} - copied for row in rows)
         # a run of this sweep, or another sweep
         originals = [{twin if twin[0] == index else (twin[0], None) for twin in equal} for equal in equal_runs]

@@ -76,7 +76,10 @@ class Composition:
 
     @property
     def components(self) -> frozenset[str]:
-        """Names that identify the explanation: effects, mistake, kinds of faults, and "unnamed" for a smooth curve."""
+        """Names that identify the explanation: of effects, of the mistake, "part: level" for a faulty level, and so on.
+
+        "levels" stands for rig errors of whole levels, and "unnamed" for a smooth curve or deviation.
+        """
         marks = [f"part: {part.family}" for part in self.faulty_parts] + ["levels"] * self.best.has_level_errors
         return frozenset((*self.causes, *marks, *["unnamed"] * self.unnamed))
 

@@ -63,9 +63,8 @@ def is_unit_alone(header: str, vocabulary: Vocabulary) -> bool:
 
 def is_test(roles: set[str]) -> bool:
     """Return True if columns of these roles are those of a loop or sweep; a force may be read as its amplitude."""
-    roles = roles | {
-        CONVERSIONS[role][0] for role in roles & CONVERSIONS.keys()
-    }  # such as loss_factor of damping_ratio
+    # with the roles that others are converted to, such as the loss factor of a damping ratio
+    roles = roles | {CONVERSIONS[role][0] for role in roles & CONVERSIONS.keys()}
     is_loop = "displacement" in roles and not roles.isdisjoint(("force", "force_amplitude"))
     return is_loop or (not roles.isdisjoint(_LEVELS[:2]) and any(set(pair) <= roles for pair in PAIRS))
 

@@ -18,7 +18,6 @@ from itertools import chain
 from typing import TYPE_CHECKING, Any, Literal
 
 from bushfit.errors import OutputError, printable
-from bushfit.reading.headers import ERRORS
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -137,7 +136,12 @@ def _write(book: Workbook, name: str, table: pd.DataFrame) -> None:
             else:
                 continue
             if status < 0:  # beyond the last row or column of a sheet
-                raise OutputError(**ERRORS["large_table"], place=name)
+                raise OutputError(
+                    "a table is too large for a sheet",
+                    place=name,
+                    expected="at most 1,048,576 rows and 16,384 columns",
+                    hint="--table-format csv has no such limit",
+                )
     for number, (header, column) in enumerate(table.items()):
         longest = max(len(text) for text in (str(header), *column.tolist()) if isinstance(text, str))
         sheet.set_column(number, number, min(_WIDEST, longest + 1))
