@@ -1,10 +1,8 @@
-"""The search weighs sets of explanations: what is there is the likeliest, alone, beside others, and in every order.
-
-Points left out that meet at one frequency tell of a disturbance there; points that go wrong singly do not.
-"""
+"""The search weighs sets of explanations: the true causes are the most probable, alone and together, in any order."""
 
 import re
 from dataclasses import replace
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -31,17 +29,22 @@ from rigged import (
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.simulated import SimulatedLoop, SimulatedSweep
 from bushfit.effects import BASE
+from bushfit.errors import ModelError
 from bushfit.geometry import Bushing, Direction
 from bushfit.model.model import Model
 from bushfit.reading.preload import Preload
 from bushfit.simulation.exact import simulate_exact
 from bushfit.simulation.measured import measure
 
-#: The axial level of 0.2 mm.
 level_too_stiff = off(0, 1.05, amplitude=LEVELS[1])
 #: The second sweep, at its smallest level, or as a whole (as by a preload) and once more at its largest level.
 smallest_too_stiff = off(1, 1.06, amplitude=LEVELS[0])
 largest_too_stiff = both(off(1, 1.1), off(1, 1.04, amplitude=LEVELS[2]))
+
+
+def test_a_candidate_that_cannot_be_simulated_without_one_of_its_effects_is_left_out(measured, monkeypatch):
+    monkeypatch.setattr("bushfit.diagnosis.hypotheses.laplace", Mock(side_effect=ModelError("too compliant")))
+    assert asked(measured(INERTIA, SHARED)).verdict == "described"
 
 
 @pytest.mark.parametrize(("tamper", "level"), [(smallest_too_stiff, "0.1"), (largest_too_stiff, "0.5")])
