@@ -60,18 +60,22 @@ class BushfitError(Exception):
 
 
 @contextmanager
-def error_location(file: Path | None = None, place: str | None = None, hint: str | None = None) -> Iterator[None]:
+def error_location(
+    file: Path | None = None, place: str | None = None, hint: str | None = None, *, default_place: str | None = None
+) -> Iterator[None]:
     """Context that adds a file, a place and a next step to errors raised inside it.
 
     Args:
         file: replaces the file of the error, unless None.
         place: replaces the place of the error, unless None.
         hint: next step for errors without one.
+        default_place: place for errors without one.
     """
     try:
         yield
     except BushfitError as error:
-        error.file, error.place, error.hint = file or error.file, place or error.place, error.hint or hint
+        error.file, error.hint = file or error.file, error.hint or hint
+        error.place = place or error.place or default_place
         raise
 
 

@@ -19,7 +19,7 @@ from bushfit.campaign.strain import with_strain_checked
 from bushfit.campaign.toml import parse_toml
 from bushfit.caveat import join_names
 from bushfit.effects import effect_name_of, place_suffix, with_base
-from bushfit.errors import BushfitError, CampaignError, error_location, quote_path
+from bushfit.errors import CampaignError, error_location, quote_path
 from bushfit.geometry import Bushing, Direction, Place, Specimen, get_places
 from bushfit.model.laws import register_file
 from bushfit.model.model import FIVE, Model
@@ -131,11 +131,9 @@ def load_campaign(path: str | Path) -> Campaign:
         """
         arguments = reader_keywords(path, tests, [*islice(names, len(tests))], specimens)
         for number, _ in enumerate(track(f"{kind} read", tests), start=1):
-            try:
-                measured = reader(**(keywords := next(arguments)))
-            except BushfitError as error:
-                error.place = error.place or f"[[{kind}]] #{number} of {path}"
-                raise
+            with error_location(default_place=f"[[{kind}]] #{number} of {path}"):
+                keywords = next(arguments)
+                measured = reader(**keywords)
             yield measured, keywords["test"]
 
     check = partial(with_strain_checked, bushing=bushing)
