@@ -45,7 +45,7 @@ class EffectEntry(TypedDict):
         correction: line for the campaign file that corrects the mistake; null for an effect.
         parameters: fitted parameters of the effect by name.
         evidence: reason why the diagnosis names this effect or mistake.
-        alternatives: explanations that these tests cannot distinguish from this effect or mistake.
+        alternatives: explanations without this effect or mistake that these tests cannot exclude.
     """
 
     name: str

@@ -24,11 +24,12 @@ _LESS_LIKELY = "another explanation is more probable"
 _LEAD = "reduces the gap; a smooth deviation of the compound, which is also present, may have the same cause"
 
 
-def probability_text(composition: Composition, finding: Finding) -> str:
-    """Text with the probabilities of an explanation and of its rival: "probability 90 %, that of inertia 10 %"."""
-    rivals = [rival for rival in finding.reported if rival is not composition][:1]
+def probability_text(label: str, finding: Finding) -> str:
+    """Text with the probability of an effect or mistake, and of a rival: "probability 90 %, that of inertia 10 %"."""
+    probability = sum(composition.probability for composition in finding.reported if label in composition.labels)
+    rivals = [rival for rival in finding.reported if label not in rival.labels][:1]
     following = [f"that of {rival.label} {format_probability(rival.probability)}" for rival in rivals]
-    return ", ".join([f"probability {format_probability(composition.probability)}", *following])
+    return ", ".join([f"probability {format_probability(probability)}", *following])
 
 
 def undecided_text(reported: Sequence[Composition]) -> str:

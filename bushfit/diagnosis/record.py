@@ -87,7 +87,7 @@ class NamedCause:
     Args:
         name: name of the effect or mistake.
         evidence: reason why the effect or mistake is named.
-        alternatives: explanations that these tests cannot distinguish from this one.
+        alternatives: explanations without this effect or mistake that these tests cannot exclude.
         test: name of the test with the mistake; None for an effect, or a mistake in [bushing].
         sentence: statement of the mistake; "" for an effect, whose own sentence is then used.
         correction: line to write into the campaign to correct the mistake; "" for an effect.

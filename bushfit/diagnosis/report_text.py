@@ -100,7 +100,7 @@ class DiagnosisWriter:
         verbs = ("closes", "explains") if len(names) == 1 else ("close", "explain")
         why = f"lowers chi-square by {base.chi_square - fit.chi_square:.0f}"
         why += " with the other named effects" * (len(names) > 1)
-        entries = [NamedCause(name, f"{why}; {probability_text(first, self.finding)}") for name in names]
+        entries = [NamedCause(name, f"{why}; {probability_text(name, self.finding)}") for name in names]
         summary, advice = f"{join_names(names)} {verbs[0]} the gap", ""
         if self.finding.verdict == "partly":
             excess = [max(fitted.mean_square - 1.0, 0.0) for fitted in (base, fit)]
@@ -157,8 +157,8 @@ class DiagnosisWriter:
         rivals = tuple(composition for composition in reported if composition is not leader)
         entries = self._record_entries(leader, rivals)
         if not entries:
-            why = probability_text(leader, self.finding)
-            entries = [NamedCause(name, why, rivals) for name in leader.names]
+            without = {name: tuple(rival for rival in rivals if name not in rival.names) for name in leader.names}
+            entries = [NamedCause(n, probability_text(n, self.finding), others) for n, others in without.items()]
         faulty = next((composition.best for composition in reported if composition.faulty_parts), None)
         advice = self._deciding_advice(leader)
         return self._build(closing, "; ".join(sentences), entries, at_fault=faulty, next_test=advice)
@@ -225,7 +225,8 @@ class DiagnosisWriter:
         if (mistake := composition.best.mistake) is None:
             return []
         gain = self.search.base.chi_square - composition.best.state.plain.chi_square
-        why = f"lowers chi-square by {gain:.0f} without a new parameter; {probability_text(composition, self.finding)}"
+        why = f"lowers chi-square by {gain:.0f} without a new parameter; "
+        why += probability_text(mistake.labels[0], self.finding)
         singles = [replace(mistake, tests=(index,)) for index in mistake.tests] or [mistake]
         return [
             NamedCause(

@@ -151,9 +151,10 @@ def decide_verdict(hypotheses: Sequence[Hypothesis], tolerance: float, *, gap_st
     share = {name: sum(c.probability for c in compositions if name in c.names) for name in first.names}
     names = tuple(name for name in first.names if share[name] >= NAMED)
     nameless = sum(composition.probability for composition in likely if composition.components == {"unnamed"})
-    if len(likely) <= MOST_REPORTED and nameless < 0.5 and fits:
+    agree = {*names} == {cause for composition in likely for cause in composition.causes}
+    if len(likely) <= MOST_REPORTED and nameless < 0.5 and fits and not (names and agree):
         return Finding("ambiguous", nothing, reported, leads, names)
-    if names and first.unnamed and fits:  # these effects, in addition to a deviation of the compound
+    if names and (first.unnamed or agree) and fits:  # these effects, in addition to faults or an unknown cause
         return Finding("partly", nothing, reported, leads, names)
     return Finding("described", nothing, reported, leads)
 

@@ -34,7 +34,8 @@ def permitted_use(document: DiagnosisFile) -> str:
     """Sentence on what the numbers may be used for after a diagnosis (content of diagnosis.json)."""
     if any(effect["correction"] for effect in document["effects"]):
         return "Correct the record first: the numbers are those of the uncorrected tests."
-    return _USES[document["verdict"]]
+    is_shared = document["verdict"] == "ambiguous" and not all(effect["alternatives"] for effect in document["effects"])
+    return _WITH_BANDS + " Do not state one cause of the rest yet." if is_shared else _USES[document["verdict"]]
 
 
 def gap_table(diagnosis: Diagnosis) -> pd.DataFrame:

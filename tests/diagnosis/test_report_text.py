@@ -181,6 +181,7 @@ def told(finding: Finding) -> dict[str, float]:
         ({"unnamed": 0.6, "inertia": 0.4}, "described", {"unnamed": 0.6, "inertia": 0.4}),
         ({"unnamed": 0.4, "inertia": 0.6}, "ambiguous", {"unnamed": 0.4, "inertia": 0.6}),
         ({"inertia": 0.69, "fixture_resonance+delay": 0.31}, "named", {"inertia": 1.0}),
+        ({"inertia+level:1 mm": 0.6, "inertia": 0.4}, "partly", {"inertia+part: level": 0.6, "inertia": 0.4}),
         ({"frequency:50 Hz": 0.5, "frequency:45 to 55 Hz": 0.49, "": 0.01}, "unexplained", {"part: frequency": 1.0}),
         ({"levels": 0.99, "": 0.01}, "unexplained", {"levels": 1.0}),
         ({"kraus+levels": 0.99, "": 0.01}, "unexplained", {"levels": 1.0}),
