@@ -157,8 +157,9 @@ class DiagnosisWriter:
         rivals = tuple(composition for composition in reported if composition is not leader)
         entries = self._record_entries(leader, rivals)
         if not entries:
-            without = {name: tuple(rival for rival in rivals if name not in rival.names) for name in leader.names}
-            entries = [NamedCause(n, probability_text(n, self.finding), others) for n, others in without.items()]
+            for name in leader.names:
+                alternatives = tuple(rival for rival in rivals if name not in rival.names)
+                entries.append(NamedCause(name, probability_text(name, self.finding), alternatives))
         faulty = next((composition.best for composition in reported if composition.faulty_parts), None)
         advice = self._deciding_advice(leader)
         return self._build(closing, "; ".join(sentences), entries, at_fault=faulty, next_test=advice)
