@@ -170,6 +170,8 @@ class DiagnosisWriter:
         advice = self._deciding_advice(candidates[0] if candidates else first)
         parts = {part.name for part in first.best.faulty_parts}
         at_fault, is_faulty = join_names(sorted(parts)), self.finding.verdict == "unexplained"
+        causes = causes_text(candidates, self.finding)
+        place = [f"the gap is largest at {at_fault}"] if at_fault else []
         if not gap and not first.best.unnamed and first.best.p_value >= DOES_NOT_FIT:
             shared = (c.probability for c in self.finding.reported if parts & {x.name for x in c.best.faulty_parts})
             is_faulty |= sum(shared) >= LEAST_NAMED_SHARE
@@ -178,16 +180,14 @@ class DiagnosisWriter:
             closes = "closes the gap"
             if after > LARGEST_CLOSED_GAP:
                 closes = f"reduces the held-out gap from {number(before, 2)} to {number(after, 2)} times the noise"
-            sentences = [f"a smooth correction {closes}: {gap.sentence}", *causes_text(candidates, self.finding)]
-            sentences += [f"the gap is largest at {at_fault}"] if at_fault else []
+            sentences = [f"a smooth correction {closes}: {gap.sentence}", *causes, *place]
         elif is_faulty and at_fault:
             sentences = [f"measure again first: {at_fault}; all other tests disagree with this part"]
         elif is_faulty:
             sentences = ["the levels disagree by more than the class of the rig, and nothing else is missing"]
             advice = _LEVELS_ADVICE
         else:
-            sentences = [*dict.fromkeys(["no known effect explains the gap", *causes_text(candidates, self.finding)])]
-            sentences += [f"the gap is largest at {at_fault}"] if at_fault else []
+            sentences = [*dict.fromkeys(["no known effect explains the gap", *causes, *place])]
         entries = [NamedCause(UNNAMED, gap.evidence, tuple(candidates))] if gap else []
         faulty = first.best if is_faulty else None
         reported: Verdict = "described" if gap else "unexplained"
