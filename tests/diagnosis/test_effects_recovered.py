@@ -26,8 +26,6 @@ from bushfit.simulation.measured import measure
 SLOW = {name for name in hideable() if "compliance" in name}
 #: Of these a fit has several minima, and the campaign has to say where about they are; a diagnosis probes them.
 NEAR = ("force_saturation.level", "force_saturation.share")
-
-
 #: Of twins, which answer alike to the last bit (see tests/effects/test_family.py), one.
 SINGLE = [name for name in hideable() if twins_of(name)[0] == name]
 SMALL = {"interface_slip.force": 5.0, "self_heating.beta": 1e-3, "viscous.eta": 80.0, "delay.tau": 4e-5}

@@ -110,8 +110,7 @@ def ask_bushfit(folder: Path) -> ToolAnswer:
         ]
     elif document["next_test"].startswith(MEASURE_AGAIN):
         claims = [[f"fault: {document['next_test'].removeprefix(MEASURE_AGAIN)}"]]
-    spelled = ((" + ".join(map(_vocabulary_name, name.split(" + "))) for name in claim) for claim in claims)
-    claims = [[*dict.fromkeys(names)] for names in spelled]
+    claims = [[*dict.fromkeys(" + ".join(map(_vocabulary_name, x.split(" + "))) for x in claim)] for claim in claims]
     where = [
         {key: region[key] for key in ("direction", "frequency_Hz", "amplitude_mm")}
         for region in document["where"]
