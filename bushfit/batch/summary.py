@@ -295,9 +295,9 @@ class BatchResult:
         chi_square = self.estimates.get(FIT_QUALITY["reduced_chi_square"].name, np.full((1, 1), np.nan))[0]
         if len(parts) > 1 and np.all(chi_square >= BEYOND_NOISE):
             ends = format_range("", chi_square.min(), chi_square.max()).strip()
+            ends += f", largest for {parts[int(chi_square.argmax())].name}"
             sentence = f"the model misses the tests of all {len(parts)} parts (reduced chi-square {ends}); {included}"
-            advice = "look for a common cause, an effect or a mistake in the record: diagnose one part"
-            warnings.append(Caveat("part_misfit", f"{sentence}: {advice}"))
+            warnings.append(Caveat("part_misfit", f"{sentence}: to find a common cause, diagnose one part"))
         elif missing:
             sentence = f"the tests of {listed(missing)} deviate from the model by more than noise explains; {included}"
             warnings.append(Caveat("part_misfit", f"{sentence}: bushfit batch --command diagnose looks for the cause"))
@@ -308,8 +308,9 @@ class BatchResult:
                 equal_parts[tuple(number(value, _SAME_DIGITS) for value in values)].append(part.name)
         for names in (names for names in equal_parts.values() if len(names) > 1):
             warnings.append(Caveat("same_parts", f"the tests of {listed(names)} have the same data: check their files"))
-        if lacking := [part.name for part, lacks in zip(parts, self.lacks_sweep, strict=True) if lacks]:
-            sentence = f"not compared with the other parts, because a sweep is missing: {listed(lacking)}"
+        if lacking := [part.name for part in parts if self.curves and part.folder and not part.curve]:
+            sentence = "a sweep is missing, or has other frequencies or amplitudes"
+            sentence = f"measured stiffness is not compared with the other parts, because {sentence}: {listed(lacking)}"
             warnings.append(Caveat("part_without_sweep", sentence))
         warnings += self._notes
         if at_bound:

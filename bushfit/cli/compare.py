@@ -98,14 +98,11 @@ def _print_comparison(output: Output, name: str, compared: ComparisonOutput) -> 
         action = f"next: {output.command(f'fit {quote_path(source.source)}{effects}', source.name)}"
         sentences = [*advice, *notes, *(compared.words if output.verbose else ())]
     else:
-        differing = zip(
-            labels, (comparison.significant_differences for comparison in compared.comparisons), strict=True
-        )
         called = {entry.label: f"{entry.label} ({entry.name})" for entry in content.compared}
         different = [
             f"{called[label]} differs from {called[first]} in {join_names(names)}"
-            for label, names in differing
-            if names
+            for label, comparison in zip(labels, compared.comparisons, strict=True)
+            if (names := comparison.significant_differences)
         ]
         verdict = f"{'; '.join(different)}, by more than chance"
         action = "do not exchange the results; differences.csv lists stiffness and loss factor at each point"

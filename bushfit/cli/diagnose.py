@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from bushfit.commands.diagnose import DiagnosisOutput
 
 #: Title of the regions in which model and tests disagree.
-_WHERE = "where (size of the smooth part of the gap, in standard errors σ)"
+_WHERE = "where tests and plain model disagree (size of the smooth part of the gap, in standard errors σ)"
 #: Terminal colours of the verdicts.
 _COLOURS = {"consistent": "green", "named": "green", "unexplained": "red"}
 
@@ -118,11 +118,12 @@ def print_verdict(output: Output, diagnosed: DiagnosisOutput, again: str, action
     lines = [use] if action and colour != "green" else []
     lines += [*diagnosed.diagnosis.summary.split("; "), *format_odds(diagnosed.document)]
     if labels := diagnosed.adoptable_names:
-        exclude = {"exclude": "--without"} if diagnosed.diagnosis.verdict == "ambiguous" else {}
+        is_open, included = diagnosed.diagnosis.verdict == "ambiguous", diagnosed.result.model.effects
+        uncertain = [label for label in labels if is_open and label not in included]
         source = "the records" if any(effect["correction"] for effect in diagnosed.document["effects"]) else "tests"
-        for answer, option in {"confirm": "--adopt", **exclude}.items():
-            options = "".join(f" {option} {quote_path(label)}" for label in labels)
-            lines.append(f"if {source} {answer} {join_names(labels)}: {again}{options}")
+        for answer, option, names in (("confirm", "--adopt", labels), ("exclude", "--without", uncertain)):
+            if options := "".join(f" {option} {quote_path(name)}" for name in names):
+                lines.append(f"if {source} {answer} {join_names(names)}: {again}{options}")
     for line in lines:
         output.console.print(f"  {escape(line)}")
 

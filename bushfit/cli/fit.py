@@ -122,6 +122,7 @@ def _print_and_write(
         max_nrmse: misfit above which the command exits with status 1; None without a limit.
     """
     from bushfit.fitting.model_error import BEYOND_NOISE
+    from bushfit.prediction.caveats import warnings_of
 
     campaign, result, file = fitted.data.campaign, fitted.result, quote_path(fitted.data.campaign.path)
     written = quote_path(folder / f"{fitted.files[0].name}.json")
@@ -145,8 +146,9 @@ def _print_and_write(
         verdict, aim, words = left_open, "choose tests that determine them", f"plan {file} --hours 1"
     command = output.command(words, campaign.name) if words else output.command(f"predict {written}", result.name)
     output.print_headline(campaign.name, verdict, f"next, {aim}: {command}")
+    output.warn(warnings_of(result))
     for title, step in fitted.steps:
-        print_step(output, f"{campaign.name}: {title}", step)
+        print_step(output, f"{campaign.name}: {title}", step, "" if step is result else "static fit")
     for table in (part.content() for part in fitted.files if part.name == "bushings"):
         rows = [
             (row[0], str(row[1]), *(number(value, 2) for value in row[2:])) for row in table.itertuples(index=False)

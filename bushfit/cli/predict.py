@@ -166,7 +166,6 @@ def _print_static(output: Output, curve: StaticCurve) -> None:
 
 def print_predictions(output: Output, predicted: PredictionOutput) -> None:
     """Print the rows of each prediction table at the lowest and highest frequency, and collect its warnings."""
-    from bushfit.caveat import join_names
     from bushfit.report.tables import prediction_table, spread_indices
     from bushfit.units import format_aligned, number
 
@@ -184,8 +183,8 @@ def print_predictions(output: Output, predicted: PredictionOutput) -> None:
                 value, *limits = format_aligned([row[name], *band], digits)
                 cells.append(f"{value} ({' to '.join(limits)})" if band[0] < band[1] else value)
             rows.append(cells)
-        causes = join_names(predicted.result.possible_causes, "or")
-        bands = ", with 95 % bands" * bool(predicted.result.measured) + f", which include {causes}" * bool(causes)
+        bands = ", with 95 % bands" * bool(predicted.result.measured)
+        bands += ", which include each possible cause" * bool(predicted.result.possible_causes)
         title = f"{owner}{prediction.label}, first and last frequency{bands}"
         output.print_table(title, list(table.columns[:4]), rows, text_columns=0)
     output.warn(predicted.warnings)

@@ -48,12 +48,10 @@ def print_validations(output: Output, validations: Sequence[Validation]) -> None
         output.warn(warning.about(validation.record.name) for warning in warnings)
 
 
-def print_step(output: Output, title: str, result: Result, source: str = "") -> None:
-    """Print a fit result with its warnings, which name the file `source`, and with -v its equation and input files."""
-    from bushfit.prediction.caveats import warnings_of
-
+def print_step(output: Output, title: str, result: Result, source: str) -> None:
+    """Print a fit result, and the warnings of its fit if they name a file or step `source`; with -v also its origin."""
     print_result(output, title, result)
-    output.warn(warning.about(source) if source else warning for warning in warnings_of(result))
+    output.warn(warning.about(source) for warning in result.warnings if source)
     print_origin(output, result)
 
 

@@ -38,7 +38,7 @@ _FIRST = 16
 #: Warning for a model with a smooth correction.
 _CORRECTED = Caveat(
     "gap_in_parameters",
-    "a smooth correction closes a gap that no effect explains: "
+    "a smooth correction closes a gap whose cause is not certain: "
     "the parameters and their intervals contain a part of this gap",
 )
 

@@ -9,7 +9,7 @@ from collections.abc import Hashable, Iterator, Sequence
 
 import numpy as np
 
-from bushfit.caveat import Caveat
+from bushfit.caveat import Caveat, join_names
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError
 from bushfit.fitting.coordinates import Coordinates
@@ -223,7 +223,8 @@ def misfit_warnings(model: Model, data_sets: Sequence[MeasuredTest], parameters:
     if by_test or excess_chi_square(chi_square, freedom) is not None:
         worst = max(by_test, key=lambda name: by_test[name], default="")
         in_worst = f", {number(by_test[worst], 2)} in {worst}" if len(data_sets) > 1 and worst else ""
-        missed = f"the model misses the data by more than their noise (reduced chi-square {number(chi_square, 2)}"
+        tests = join_names(sorted({f"{test.kind}s" for test in data_sets}))
+        missed = f"the model misses the {tests} by more than their noise (reduced chi-square {number(chi_square, 2)}"
         yield Caveat("misfit", f"{missed}{in_worst}): intervals are invalid, though standard errors are scaled up")
 
 

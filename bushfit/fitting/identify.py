@@ -122,7 +122,7 @@ def undetermined_parameters(
     combinations = dict[str, None]()
     for group in groups:
         listed = ", ".join(f"{name} {_percent(errors[name])}" for name in group)
-        reasons = "; ".join(_reasons(model, data_sets, group)) or "these tests do not determine"
+        reasons = "; ".join(_reasons(model, data_sets, group)) or "a limit of these tests"
         meaning = f"{', '.join(group[:-1])} and {group[-1]} cannot be determined separately"
         if set(group) == set(_FRICTION) and np.linalg.norm(rows["sigma_fmax"] - rows["eps_half"]) < _KNOWN:
             meaning = "sigma_fmax and eps_half are determined only as a ratio"

@@ -354,10 +354,9 @@ class Result:
 
     @property
     def possible_causes(self) -> list[str]:
-        """Effects that the model lacks and the tests do not rule out, such as "delay with inertia (4 %)"."""
-        rivals = (rival for rival in self.alternatives if not {*rival.model.effects} <= {*self.model.effects})
-        added = (([name for name in one.model.effects if name not in (*BASE, UNNAMED)], one) for one in rivals)
-        return [f"{' with '.join(names)} ({100.0 * rival.probability:.0f} %)" for names, rival in added]
+        """Effects that the model lacks and the tests do not rule out, such as "delay + inertia"."""
+        rivals = (one.model.effects for one in self.alternatives if not {*one.model.effects} <= {*self.model.effects})
+        return [" + ".join(name for name in effects if name not in (*BASE, UNNAMED)) for effects in rivals]
 
     @property
     def fitted_places(self) -> list[Place]:

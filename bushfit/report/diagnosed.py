@@ -24,7 +24,7 @@ _USES = {
     "consistent": "Use the model within the tested range, with its 95 % bands.",
     "named": "Use the model, which includes the named effect, within the tested range.",
     "ambiguous": f"{_WITH_BANDS} Do not state one cause yet.",
-    "described": f"{_WITH_BANDS} The cause is not known.",
+    "described": f"{_WITH_BANDS} The cause is not known and may be the rig.",
     "partly": f"{_WITH_BANDS} Part of the gap is not explained.",
     "unexplained": "Do not release these numbers: the model misses the tests, and the cause is not known.",
 }

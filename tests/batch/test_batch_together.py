@@ -98,10 +98,10 @@ def test_parts_with_the_same_data_or_without_the_sweep_of_the_others_are_named()
     records = [*[whole] * 6, replace(whole, curve={})]
     plan: Any = SimpleNamespace(limits=None, task=SimpleNamespace(points=()))
     result = BatchResult(plan, records, 0, 0.0, ())
-    assert np.flatnonzero(np.isnan(result.compared_values["mu"][0])).tolist() == [6]
-    parts: Any = [SimpleNamespace(name=f"P{number}", poor_fit="", warning_kinds=()) for number in range(7)]
-    assert [warning.kind for warning in result.warnings(parts)] == ["same_parts", "part_without_sweep"]
-    assert str(result.warnings(parts)[1]) == "not compared with the other parts, because a sweep is missing: P6"
+    assert np.isnan(result.compared_values["mu"][0]).tolist() == [False] * 6 + [True]
+    parts: Any = [SimpleNamespace(name=f"P{n}", poor_fit=0, warning_kinds=(), folder=1, curve=n < 6) for n in range(7)]
+    named = [(warning.kind, warning.text[-2:]) for warning in result.warnings(parts)]
+    assert named == [("same_parts", "es"), ("part_without_sweep", "P6")]
 
 
 @pytest.mark.parametrize(("count", "level"), [(1, 0.1), (2, 0.1), (3, 0.2), (4, 0.2)])

@@ -41,7 +41,7 @@ def index_page(batch: BatchFile, folder: Path, base: str = "") -> str:
     curves = np.array([part.curve or [np.nan] * len(batch.curve_points) for part in parts], dtype=float)
     usual = np.array([bool(part.curve) and not (part.deviations or part.poor_fit) for part in parts])
     has_curves = bool(usual.any())
-    relative = curves / np.nanmedian(curves, axis=0) - 1.0 if has_curves else curves
+    relative = curves / np.exp(np.nanmedian(np.log(curves), axis=0)) - 1.0 if has_curves else curves
     scale = max(_LEAST_SCALE, 1.5 * float(np.abs(relative[usual]).max())) if has_curves else 0.0
     heights = np.clip(relative / scale, -1.0, 1.0) if has_curves else relative
     status, links, listed = list[str](), list[str](), {name: list[tuple[PartTable, str]]() for name in _ORDER}
@@ -66,9 +66,9 @@ def index_page(batch: BatchFile, folder: Path, base: str = "") -> str:
         for warning in caveats[index]:
             warnings.setdefault(warning.kind, []).append((parts[index].name, warning.text))
     numbers, summaries = {kind: number for number, kind in enumerate(warnings, start=1)}, list[str]()
-    for named in warnings.values():  # such as "3 parts, such as A7: ..." with the warning of the first part
+    for named in warnings.values():  # such as "3 parts, with the figures of A7: ..."
         names, lines = (list(dict.fromkeys(column)) for column in zip(*named, strict=True))
-        several = f"{len(names)} parts{', such as ' + names[0] if len(lines) > 1 else ''}"
+        several = f"{len(names)} parts{', with the figures of ' + names[0] if len(lines) > 1 else ''}"
         summaries.append(f"{names[0] if len(names) == 1 else several}: {lines[0]}")
     for index in chosen:
         is_known = has_curves and np.isfinite(relative[index]).all()
