@@ -2,6 +2,7 @@
 
 import hashlib
 import os
+import re
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -42,6 +43,8 @@ from bushfit.validation import validate_tables
 _TABLES = (".csv", ".txt", ".tsv", ".dat", ".asc", ".lvm", ".xls", ".xlsx", ".xlsm", ".xlsb", ".ods")
 #: Endings of test files, from which `bushfit init` writes a campaign.
 TEST_FILES = (*_TABLES, ".gz", *RECORDINGS)
+#: Line of a TOML file that begins a table of tests.
+_LISTS_TESTS = re.compile(rb"^\s*\[\[?(?:loops|sweeps|simulate)\]", re.MULTILINE)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -265,12 +268,17 @@ def model_of(campaign: Campaign) -> Model:
         return Model(campaign.bushing, names, {**used, **campaign.simulate.effect_parameters})
 
 
+def campaigns_in(folder: Path) -> list[Path]:
+    """Return the campaigns of a folder in order: its TOML files that list tests."""
+    return [path for path in sorted(folder.glob("*.toml")) if _LISTS_TESTS.search(path.read_bytes())]
+
+
 def refuse_tests(paths: Sequence[Path]) -> None:
     """Raise a CampaignError if the paths are test files, a folder or a model file instead of a campaign."""
     model = paths[0]
     try:
         tests = [path for path in paths if path.is_dir() or (path.suffix.lower() in TEST_FILES and path.exists())]
-        campaigns = [quote_path(path) for folder in tests for path in sorted(folder.glob("*.toml"))]
+        campaigns = [quote_path(path) for folder in tests for path in campaigns_in(folder)]
         if not tests and not (model.suffix.lower() == ".json" and model.exists()):
             return
     except OSError:  # a locked folder, or a name that is too long: the reader reports it

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Protocol
 
-from bushfit.campaign.campaign import TEST_FILES, Campaign, load_campaign
+from bushfit.campaign.campaign import TEST_FILES, Campaign, campaigns_in, load_campaign
 from bushfit.errors import ModelError, quote_path
 from bushfit.model.file import load_result
 from bushfit.model.result import Result
@@ -53,7 +53,7 @@ def model_file(path: Path) -> Path:
         return path / "model.json"
     if path.is_dir() or (path.is_file() and ending in (".toml", *TEST_FILES)):
         found = "a folder without model.json" if path.is_dir() else "a campaign" if ending == ".toml" else "a test file"
-        campaign = next(iter(sorted(path.glob("*.toml"))), path)
+        campaign = next(iter(campaigns_in(path)), path)
         steps = "to write a campaign, which bushfit run then fits: bushfit init", "to write one: bushfit run"
         step = f"{steps[campaign.suffix.lower() == '.toml']} {quote_path(campaign)}"
         models = [quote_path(path / name) for name in ("fit", "diagnose") if (path / name / "model.json").is_file()]

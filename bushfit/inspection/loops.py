@@ -53,9 +53,9 @@ def describe_loop(loop: Loop, labels: Mapping[str, Labels]) -> Findings:
         FitError: no whole cycle, or a loop that runs the wrong way round.
     """
     prepared, units, names = prepare_loop(loop), loop.direction.display, loop.direction.motion.words
-    (length, to_length), half_force = units.displacement, float(np.ptp(loop.force)) / 2.0
+    (length, to_length), half_force = units.displacement, float(np.ptp(prepared.test.force)) / 2.0
     force, to_force = display_unit(*units.force, half_force)
-    half_motion = float(np.ptp(loop.displacement)) / 2.0
+    half_motion = float(np.ptp(prepared.test.displacement)) / 2.0
     frequency, amplitude = float(prepared.frequency[0]), float(prepared.amplitude[0])
     # the mean of a Fourier series, whatever part of a cycle the record begins or ends in
     mean_force = float(least_squares(basis(prepared.phase, 2), prepared.measured_force, prepared.weights)[0])

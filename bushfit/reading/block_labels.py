@@ -14,9 +14,8 @@ from typing import TYPE_CHECKING
 from bushfit import units
 from bushfit.caveat import Caveat
 from bushfit.geometry import Place, Specimen
-from bushfit.reading.channel_lists import SCALES
 from bushfit.reading.headers import COUNTED, HINTS, SWEEP_COLUMNS, Vocabulary, plain, plain_name, split_unit
-from bushfit.reading.layout import STEPS
+from bushfit.reading.layout import SCALES, STEPS
 from bushfit.reading.lines import Line, is_summary_row
 from bushfit.reading.names import (
     is_remark,

@@ -35,7 +35,7 @@ _UNCERTAIN = re.compile(r"([+-]?\d[\d.,]*)\s*(?:\(?\s*(?:±|\+/?-)\s*\d[\d.,]*\s
 _NAME_OF_SIDE = re.compile(
     r"(?<![^\s_])(?=(\d+(?:[.,]\d+)?\s?(?:[^\W\d_]{1,3}|%)|(?:[^\W\d_][^\W_]*[\s_])?#?\d|[^\W\d_][^\W_]*)(?![^\s_]))"
 )
-#: Words for a set point, a deviation or a corrected value, which name no block.
+#: Words for a set point, a deviation, a corrected value or a bound, which name no block.
 _STATISTICS = frozenset(map(plain, (*WORDS["qualifiers"]["not_measured"], *WORDS["qualifiers"]["processed"])))
 #: First rows that are searched for complex numbers and units; chosen: room for remarks.
 _FIRST = 8
@@ -231,6 +231,8 @@ def _stacked_blocks(source: RowSource, layout: Layout, vocabulary: Vocabulary) -
     def texts(line: Line) -> list[str]:
         return [str(cell) for cell in cells_of(line, layout.delimiter)]
 
+    first = next((texts(line)[0] for line in source.lines(layout.lines_before_data) if is_row(texts(line))), "")
+
     def is_note(line: Line) -> bool:
         return not layout.numbered and is_comment(line.content, layout.delimiter)
 
@@ -238,7 +240,8 @@ def _stacked_blocks(source: RowSource, layout: Layout, vocabulary: Vocabulary) -
         """True for a row of numbers, None for any other line."""
         cells = [line.content] if isinstance(line.content, str) else [c for c in line.content if isinstance(c, str)]
         has_letters = is_note(line) or any(map(_LETTER.search, cells))
-        return not has_letters or (not is_note(line) and is_row(texts(line))) or None
+        is_named_row = has_letters and is_like_number(first) and not is_like_number(texts(line)[0])
+        return not has_letters or (not is_note(line) and is_row(texts(line)) and not is_named_row) or None
 
     def is_left_out(line: Line) -> bool:
         cells = texts(line)

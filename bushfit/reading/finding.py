@@ -10,9 +10,10 @@ from bushfit.errors import BushfitError, MeasurementError, error_location
 from bushfit.geometry import TRANSLATION, Direction, Motion
 from bushfit.reading.blocks import combine_blocks
 from bushfit.reading.classification import classify
+from bushfit.reading.header_line import find_layout
 from bushfit.reading.headers import ALL_COLUMNS, ERRORS, LOOP_COLUMNS, Vocabulary
 from bushfit.reading.labelled import Rows, select_rows
-from bushfit.reading.layout import DELIMITERS, MOST_HEAD_LINES, FileFormat, Layout, find_layout
+from bushfit.reading.layout import DELIMITERS, MOST_HEAD_LINES, FileFormat, Layout
 from bushfit.reading.names import direction_of_file, named_direction
 from bushfit.reading.parts import OpenedFile, open_file
 from bushfit.reading.reshape import reshape_table
@@ -56,10 +57,11 @@ def find_table(
     vocabulary = Vocabulary(names_for_motion(names, motion), named, stated_units)
     every_name = Vocabulary(ALL_COLUMNS, named, stated_units)
     may_be_wide, layouts = "amplitude" in names and header_line is None, list[tuple[RowSource, Layout]]()
-    for as_written, in_one in _locate(opened, named, stated_units):
-        is_loop = {"time", "displacement", "force"} <= Vocabulary(LOOP_COLUMNS, named).roles(as_written[1].headers)
-        wide = unpivot(*as_written, opened.file, vocabulary) if may_be_wide and not is_loop else None
-        layouts.append(wide or in_one)
+    with error_location(opened.file):
+        for as_written, in_one in _locate(opened, named, stated_units):
+            is_loop = {"time", "displacement", "force"} <= Vocabulary(LOOP_COLUMNS, named).roles(as_written[1].headers)
+            wide = unpivot(*as_written, vocabulary) if may_be_wide and not is_loop else None
+            layouts.append((wide, wide.layout) if wide and wide.layout else in_one)
     if len(layouts) > 1:
         layouts = [entry for entry in layouts if len(vocabulary.roles(entry[1].headers) - {"time"}) > 1]
     if len(opened.parts) > 1 and not any(is_test(every_name.roles(layout.headers)) for _, layout in layouts):
@@ -104,16 +106,14 @@ def _locate(
     if key not in opened.located:
         vocabulary, stated = Vocabulary(ALL_COLUMNS, columns, stated_units), opened.stated
         located = opened.located[key] = []
-        with error_location(opened.file):
-            for source in opened.parts:
-                if (stated.header_line or 0) > MOST_HEAD_LINES // 2:
-                    source = source.after((stated.header_line or 0) - MOST_HEAD_LINES // 2)
-                mark = "" if isinstance(source, Sheet) else DELIMITERS.get(stated.delimiter or "")
-                layout = source.layout or find_layout(source.head, vocabulary, mark, stated.header_line)
-                if not stated.header_line and (long := reshape_table(source, layout, vocabulary)):
-                    source, layout = long, find_layout(long.head, vocabulary, "")
-                    layout = replace(layout, notes=(*long.notes, *layout.notes))
-                located.append(((source, layout), combine_blocks(source, layout, vocabulary)))
+        for source in opened.parts:
+            if (stated.header_line or 0) > MOST_HEAD_LINES // 2:
+                source = source.after((stated.header_line or 0) - MOST_HEAD_LINES // 2)
+            mark = "" if isinstance(source, Sheet) else DELIMITERS.get(stated.delimiter or "")
+            layout = source.layout or find_layout(source.head, vocabulary, mark, stated.header_line)
+            if not stated.header_line and (long := reshape_table(source, layout, vocabulary)):
+                source, layout = long, long.layout or find_layout(long.head, vocabulary, "")
+            located.append(((source, layout), combine_blocks(source, layout, vocabulary)))
     return opened.located[key]
 
 

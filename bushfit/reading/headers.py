@@ -129,8 +129,9 @@ _SPELLINGS: dict[int, int | str] = {
 }
 #: End of a name before a unit without brackets: "force_N", "Kraft in N", "F / kN", "load, N".
 _NAME_END = re.compile(r"\s+in\s+|\s*/\s*|\s*,\s*|\s+|_")
-#: Newton per a length in a name without capitals: "n_per_mm" or "n_mm"; and the word before a part of such a unit.
-_PER_OF_NEWTON, _PER = re.compile(r"(?<![^\W_])(k?)n[ _](?:per[ _])?(?=m)"), re.compile(r"(?<![^\W_])per$")
+#: Newton per a length in a name without signs: "n_per_mm", "n_mm", "Npmm"; and the word before a part of such a unit.
+_PER_OF_NEWTON = re.compile(r"(?<![^\W_])(k?)(?:n[ _](?:per[ _])?|[nN]p)(?=m)")
+_PER = re.compile(r"(?<![^\W_])per$")
 
 
 @dataclass(frozen=True)

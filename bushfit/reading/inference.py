@@ -210,8 +210,8 @@ def moves_along(table: Table, first: Column, second: Column) -> bool:
 def add_motion_as_amplitude(table: Table, roles: dict[str, Column], stated_units: Mapping[str, str]) -> list[Caveat]:
     """Use a column that is named like a displacement as the amplitude of a sweep, and add it to the known columns.
 
-    The table must have a force amplitude, or the name must be a symbol, such as x. A stiffness, if there is one, must
-    agree with force over displacement.
+    The table must have a force amplitude, or the column must count peak to peak or rms, or its name must be a symbol,
+    such as x. A stiffness, if there is one, must agree with force over displacement.
 
     Args:
         table: header and rows of the table.
@@ -229,7 +229,7 @@ def add_motion_as_amplitude(table: Table, roles: dict[str, Column], stated_units
     ]
     fitting = [c for c in candidates if any(units.is_compatible(c.unit or "", si) for si in ("m", "rad"))]
     has_force = "force_amplitude" in roles
-    if len(fitting) != 1 or not (has_force or plain_name(fitting[0].header) in _SYMBOLS):
+    if len(fitting) != 1 or not (has_force or fitting[0].convention or plain_name(fitting[0].header) in _SYMBOLS):
         return []
     if has_force and "stiffness" in roles:
         columns = (fitting[0], roles["force_amplitude"], roles["stiffness"])

@@ -66,9 +66,13 @@ def split(content: Content, delimiter: str) -> list[str]:
 
 
 def is_comment(content: Content, delimiter: str) -> bool:
-    """Return True if a line begins with a comment sign: #, %, //, or a semicolon that is not the delimiter."""
+    """Return True if a line begins with a comment sign: #, %, //, or a semicolon that is not the delimiter.
+
+    A # in a cell of its own is the name or unit of a column that counts.
+    """
     text = content if isinstance(content, str) else next((str(cell) for cell in content if cell != ""), "")
-    return text.lstrip().startswith(_COMMENT_SIGNS if delimiter == ";" else (*_COMMENT_SIGNS, ";"))
+    begins = text.lstrip().startswith(_COMMENT_SIGNS if delimiter == ";" else (*_COMMENT_SIGNS, ";"))
+    return begins and (delimiter == " " or split(content, delimiter)[0] != "#")
 
 
 def is_row(cells: Sequence[str]) -> bool:

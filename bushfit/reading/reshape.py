@@ -135,7 +135,8 @@ def _name_curves(source: RowSource, layout: Layout) -> Sheet | None:
         sentence = f'the curves have x values of their own: they are interpolated at those of "{names[1]}"'
         notes = (Caveat("resampled", sentence),)
     rows_of_curves = np.column_stack([x, *(curve[1] for curve in curves)]).tolist()
-    return Sheet("", [names, *rows_of_curves], notes=notes)
+    layout = Layout(layout.delimiter, tuple(names), 1, ("",) * len(names), None, notes=notes)
+    return Sheet("", [names, *rows_of_curves], layout=layout)
 
 
 def _spread_names(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> Sheet | None:
@@ -165,7 +166,7 @@ def _spread_names(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> 
         name += f" [{cells[unit]}]" if unit is not None and cells[unit] else ""
         rows.append(KeyedValue(line.number, tuple(cells[n] for n in keys), name, cells[values]))
     several = len({row.name for row in rows}) > 1
-    return _spread(source, layout, [layout.headers[n] for n in keys], rows) if several else None
+    return spread(source, layout, [layout.headers[n] for n in keys], rows) if several else None
 
 
 def _join_blocks(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> Sheet | None:
@@ -181,21 +182,21 @@ def _join_blocks(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> S
             rows.append(KeyedValue(line.number, tuple(cells[:-1]), headers[-1][-1], cells[-1]))
         elif len(texts) == width and texts[:-1] == layout.headers[:-1] and texts not in headers:
             headers.append(texts)
-    return _spread(source, layout, layout.headers[:-1], rows) if len(headers) > 1 else None
+    return spread(source, layout, layout.headers[:-1], rows) if len(headers) > 1 else None
 
 
-def spread(
-    keys: Sequence[str], values: Sequence[KeyedValue]
-) -> tuple[list[str], list[int], list[Sequence[str | float]]]:
+def spread(source: RowSource, layout: Layout, keys: Sequence[str], values: Sequence[KeyedValue]) -> Sheet:
     """Make one row of the values with equal keys, with a column for each quantity that they name.
 
     Args:
+        source: lines or rows of the file.
+        layout: layout of the file, with the line of the header.
         keys: headers of the columns with the keys, such as the frequency.
         values: values in the order of the file.
 
     Returns:
-        Headers, and line number and cells of each row, in the order of their first values; a quantity that occurs again
-        with equal keys begins a further row.
+        Sheet with its layout and the lines above the header, whose rows are in the order of their first values; a
+        quantity that occurs again with equal keys begins a further row.
     """
     names = list(dict.fromkeys(value.name for value in values))
     rows = dict[tuple[Sequence[str | float], int], tuple[int, list[str | float]]]()
@@ -204,15 +205,11 @@ def spread(
         counts[key, name] += 1
         _, row = rows.setdefault((key, counts[key, name]), (number, [*key, *[""] * len(names)]))
         row[len(key) + names.index(name)] = cell
-    return [*keys, *names], [number for number, _ in rows.values()], [row for _, row in rows.values()]
-
-
-def _spread(source: RowSource, layout: Layout, keys: Sequence[str], values: Sequence[KeyedValue]) -> Sheet:
-    """Sheet with the lines above a table, and the rows of `spread`."""
-    above = [line.content for line in source.head if line.number < layout.header_line]
-    above = [[content] if isinstance(content, str) else content for content in above]
-    headers, _, rows = spread(keys, values)
-    return Sheet(source.sheet or "", [*above, headers, *rows])
+    numbers, content = zip(*rows.values(), strict=True)
+    above = [line for line in source.head if line.number < layout.header_line]
+    columns = (*keys, *names), layout.header_line, ("",) * (len(keys) + len(names)), None
+    layout = Layout(layout.delimiter, *columns, layout.written, notes=layout.notes)
+    return Sheet(source.sheet or "", content, numbers=numbers, above=above, layout=layout)
 
 
 def _exchange_rows(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> Sheet | None:

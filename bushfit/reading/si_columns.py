@@ -37,8 +37,9 @@ if TYPE_CHECKING:
 _MULTIPLE = re.compile(r"^(?=[\d.]*[1-9])\d+\.?\d*(?=\s+[^\W\d_])")
 #: Letter of an axis in the name of a force: "Fx", "F_z 1", "Load Y".
 _AXIS = re.compile(r"(?:^|[\W_])[a-z]?_?([xyz])(?![^\W\d_])")
-#: Word for a processed value: "Force filtered" is the same force as "Force raw", and no second load cell.
-_PROCESSED = re.compile(rf"(?<![^\W_])(?:{'|'.join(WORDS['qualifiers']['processed'])})(?![^\W_])")
+#: Word for a processed value: "Force filtered" is the same force as "Force raw", and no second load cell. An upper and
+#: a lower force may be two cells.
+_PROCESSED = re.compile(rf"(?<![^\W_])(?!upper|lower)(?:{'|'.join(WORDS['qualifiers']['processed'])})(?![^\W_])")
 #: Starts of the names of an angular frequency.
 _ANGULAR = ("angular", "angfreq", "omega", "ω", "kreisfrequenz", "pulsa", "角频率")
 #: Start of the name of a logarithm, in the spelling that `plain` returns.

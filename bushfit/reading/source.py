@@ -13,7 +13,6 @@ from typing import Any, NamedTuple
 
 from numpy.typing import NDArray
 
-from bushfit.caveat import Caveat
 from bushfit.errors import MeasurementError
 from bushfit.reading.files import CHUNK_BYTES, HEAD_BYTES
 from bushfit.reading.layout import MOST_HEAD_LINES, Layout
@@ -195,7 +194,6 @@ class Sheet:
         hidden: numbers of the rows that the workbook hides.
         divided: number of cells that a number format shows divided by a power of 1000, as they are read.
         is_visible: False for a hidden sheet of a workbook.
-        notes: warnings on how the rows were rearranged.
     """
 
     sheet: str
@@ -209,7 +207,6 @@ class Sheet:
     hidden: Sequence[int] = ()
     divided: int = 0
     is_visible: bool = True
-    notes: tuple[Caveat, ...] = ()
 
     def after(self, line: int) -> Sheet:
         """Return a copy of the sheet whose first rows, up to the one with number `line`, are empty."""

@@ -1,8 +1,9 @@
 r"""Convert wide tables of a sweep (frequencies down and amplitudes across, or the reverse) into long tables.
 
 A wide table has one block or more, side by side or one below the other. The first column of a block contains
-frequencies or amplitudes. The header of every other column states an amplitude or frequency, and the quantity, in one
-cell ("K* 0.1 mm [N/mm]") or in several. Of merged header cells only the leftmost is filled:
+frequencies or amplitudes. The header of every other column states a level, which is an amplitude, a frequency, a
+temperature or a preload, and the quantity, in one cell ("K* 0.1 mm [N/mm]") or in several. Of merged header cells only
+the leftmost is filled:
 
     K* [N/mm];0.1 mm;0.2 mm            ;0.1 mm;       ;0.2 mm;              f [Hz];K*_0.1mm [N/mm];tan_d_0.1mm;...
     5        ;1520  ;1390        f [Hz];K*    ;tan d  ;K*    ;tan d         5     ;1520           ;0.101      ;...
@@ -12,7 +13,6 @@ import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
-from pathlib import Path
 from typing import NamedTuple
 
 from bushfit import units
@@ -29,16 +29,17 @@ from bushfit.reading.reshape import KeyedValue, spread
 from bushfit.reading.roles import CONDITIONS
 from bushfit.reading.source import RowSource, Sheet, cells_of
 
-#: Roles of the two stepped quantities: one varies down the rows and the other across the columns.
-_STEPPED = ("frequency", "amplitude")
+#: Roles of the two stepped quantities, each with the other: one varies down the rows and one across the columns.
+_STEPPED = {"frequency": "amplitude", "amplitude": "frequency"}
 #: Words of the longest title of a block, such as "Radial, part 2"; chosen: more are a remark.
 _LONGEST_TITLE = 4
 #: Largest number of header rows above a block; chosen: a title, levels, quantities, and units.
 _MOST_HEADER_ROWS = 4
 #: Number in a header, with its symbol ("A = 0.1") and the word after it, which may be its unit.
 _LEVEL = re.compile(
-    r"(?:(?P<name>[^\W\d_]+)\s*=\s*)?(?<![\w.,*'|#])±?(?P<number>\d+(?:[.,]\d+)?(?:e[+-]?\d+)?)(?![.,]?\d)"
-    r"(?:\s*[\[(]?\s*(?P<unit>[^\W\d_]+|%|°(?!\s*[CFK]))[\])]?)?",
+    r"(?:(?P<name>[^\W\d_]+)\s*=\s*)?(?<![\w.,*'|#])±?"
+    r"(?P<number>(?:(?<![^\s(])-)?\d+(?:[.,p]\d+)?(?:e[+-]?\d+)?)(?![.,]?\d)"
+    r"(?:\s*[\[(]?\s*(?P<unit>°\s*[CFK]\b|[^\W\d_]+|%|°)[\])]?)?",
     re.IGNORECASE,
 )
 #: Role of a level by the symbol before it: "A = 0.1".
@@ -60,8 +61,8 @@ class _Meaning:
     Args:
         role: quantity in the column, such as "stiffness".
         unit: unit of the quantity.
-        level: text of the number of the frequency or amplitude at which the quantity was measured.
-        stepped: role of the level: "frequency" or "amplitude".
+        level: text of the number of the frequency, amplitude or condition at which the quantity was measured.
+        stepped: role of the level, such as "frequency".
         level_unit: unit of the level.
         convention: convention of an amplitude.
     """
@@ -94,17 +95,16 @@ class _WideColumn(NamedTuple):
     direction: str = ""
 
 
-def unpivot(source: RowSource, layout: Layout, file: Path, vocabulary: Vocabulary) -> tuple[RowSource, Layout] | None:
+def unpivot(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> Sheet | None:
     """Convert a wide table into a long table, with a row for each frequency and amplitude.
 
     Args:
         source: lines or rows of the file.
         layout: layout of the file if it is read as a long table.
-        file: path, for errors.
         vocabulary: known column names, by which a header has a role such as "force".
 
     Returns:
-        Source and layout of the long table; None if the file has no wide table.
+        Long table, with its layout; None if the file has no wide table.
 
     Raises:
         MeasurementError: a block does not state its quantity, or blocks differ in the unit of their levels.
@@ -114,17 +114,15 @@ def unpivot(source: RowSource, layout: Layout, file: Path, vocabulary: Vocabular
     has_merged_titles = "" in layout.headers and not set(roles).issuperset(_STEPPED)
     if (is_long and not has_merged_titles) or len(layout.headers) > _MOST_COLUMNS:
         return None
-    columns, texts, left_out = _read_blocks(source.head, layout.delimiter, vocabulary)
-    if not columns:
+    if not (read := _read_blocks(source.head, layout.delimiter, vocabulary))[0]:
         return None
-    if len(source.head) >= MOST_HEAD_LINES:
-        columns, texts, left_out = _read_blocks(source.lines(0), layout.delimiter, vocabulary)
-    sheet, long_layout = _long_table(columns, texts, source, file, vocabulary)
+    is_longer = len(source.head) >= MOST_HEAD_LINES
+    columns, texts, left_out = _read_blocks(source.lines(0), layout.delimiter, vocabulary) if is_longer else read
     summaries = [text for text in dict.fromkeys(texts) if is_summary_row([text])]
     sentences = (f'the column "{text}" is left out, because it summarizes other columns' for text in summaries)
-    notes = [*(Caveat("summary_column", sentence) for sentence in sentences), *list_left_out(source, left_out)]
+    notes = *(Caveat("summary_column", sentence) for sentence in sentences), *list_left_out(source, left_out)
     written = tuple(text for text in texts if any(m.role or m.stepped for m in _read_corner(text, vocabulary)))
-    return sheet, replace(long_layout, delimiter=layout.delimiter, written=written, notes=tuple(notes))
+    return _long_table(columns, source, replace(layout, written=written, notes=notes), vocabulary)
 
 
 def _read_blocks(
@@ -191,22 +189,23 @@ def _read_block(headers: Sequence[list[str]], rows: Sequence[Line], vocabulary: 
         corners = _read_corner(cells[0], vocabulary)
         is_name = cells[0] != "" and not is_like_number(cells[0])
         is_value = levels == {None} and not any(corner.stepped or corner.unit for corner in corners)
-        if is_name and (is_value or (distance and sum(map(bool, cells)) == 2)):
-            break  # a name and its value above the table
+        below = {meaning.stepped for meaning in meanings.values() if meaning.level}
+        if (is_name and (is_value or (distance and sum(map(bool, cells)) == 2))) or (below and levels - {None, *below}):
+            break  # a name and its value above the table, or an amplitude above temperatures
         if unclear and not (levels and all(is_summary_row([texts[column]]) for column in unclear)):
             break
         for corner in corners:
             axis = replace(corner, level_unit=corner.level_unit or corner.unit, unit=None)
             if corner.role is not None or corner.level:
-                continue
-            if corner.stepped in levels - {None} or (levels and down.stepped not in (None, corner.stepped)):
+                across |= corner if levels != {None} and not corner.level else _Meaning()
+            elif corner.stepped in levels - {None} or (levels and down.stepped not in (None, corner.stepped)):
                 across |= axis
             else:
                 down |= axis
         columns = [column for column in columns if column not in unclear]
         meanings = {column: meanings[column] | row[column] for column in columns}
-    stepped = next((meaning.stepped for meaning in (*meanings.values(), across) if meaning.stepped), None)
-    stepped = stepped or next((role for role in _STEPPED if down.stepped and role != down.stepped), None)
+    found = (meaning.stepped for meaning in (*meanings.values(), across) if meaning.stepped)
+    stepped = next(found, _STEPPED.get(down.stepped or ""))
     meanings = {n: meanings[n] | across | _Meaning(stepped=stepped) for n in columns}
     if stepped is None or len(columns) < 2 or not all(meaning.level for meaning in meanings.values()):
         return []
@@ -214,7 +213,7 @@ def _read_block(headers: Sequence[list[str]], rows: Sequence[Line], vocabulary: 
     named = {(meaning, *(texts[column] for texts in all_texts)) for column, meaning in meanings.items()}
     if len(named) > len(set(meanings.values())):
         return []  # such as K axial and K radial, or two samples, at the same level
-    down = replace(down, stepped=_STEPPED[stepped == _STEPPED[0]])
+    down = replace(down, stepped=_STEPPED.get(stepped, down.stepped or "frequency"))  # beside temperatures or preloads
     return [
         _WideColumn(meaning, down, [(row.number, row.content[0], row.content[n]) for row in rows])
         for n, meaning in meanings.items()
@@ -247,7 +246,7 @@ def _read_header(text: str, vocabulary: Vocabulary) -> _Meaning:
     rest = whole[: match.start()] + " " + whole[match.end() if stepped else match.end("number") :]
     rest = _JOINTS.sub(" ", rest).strip()
     level = _Meaning(
-        level=match["number"],
+        level=match["number"].replace("p", "."),
         stepped=stepped or _SYMBOLS.get((match["name"] or "").lower()),
         level_unit=match["unit"] if stepped else None,
         convention=convention,
@@ -255,8 +254,8 @@ def _read_header(text: str, vocabulary: Vocabulary) -> _Meaning:
     if not rest:
         return level
     named = _named_quantity(rest, vocabulary)
-    if rest.startswith("°") or (named and named.role in ("repeat", *CONDITIONS)):
-        return _Meaning()  # "Run 1", "23 °C" and "Preload 500 N" are no amplitudes
+    if named and named.role in ("repeat", *CONDITIONS):  # "Run 1" is no level, but "Preload 500 N" is
+        return _Meaning() if named.role == "repeat" else replace(level, stepped=named.role, level_unit=named.unit)
     if named:
         return level | replace(named, convention=convention)
     role = None if stepped else _role_of_unit(unit := rest.strip("[]() "))
@@ -272,21 +271,19 @@ def _named_quantity(text: str, vocabulary: Vocabulary) -> _Meaning | None:
 
 
 def _role_of_unit(unit: str | None) -> str | None:
-    """Role of a number by its unit: "frequency" or "amplitude"; None for any other unit."""
-    roles = {"Hz": "frequency", "m": "amplitude", "rad": "amplitude", "1": "amplitude"}
+    """Role of a number by its unit, such as "frequency"; None for other units, and for the symbols K, C and F."""
+    roles = {"Hz": "frequency", "m": "amplitude", "rad": "amplitude", "1": "amplitude", "K": "temperature"}
+    unit = None if unit in ("K", "C", "F") else unit
     return next((role for si, role in roles.items() if unit and units.is_compatible(unit, si)), None)
 
 
-def _long_table(
-    columns: Sequence[_WideColumn], texts: Sequence[str], source: RowSource, file: Path, vocabulary: Vocabulary
-) -> tuple[RowSource, Layout]:
+def _long_table(columns: Sequence[_WideColumn], source: RowSource, layout: Layout, vocabulary: Vocabulary) -> Sheet:
     """Build a long table (a row per frequency and amplitude) from all blocks of a wide table, with its layout.
 
     Args:
         columns: columns of all blocks.
-        texts: header cells of all blocks, for errors.
         source: lines or rows of the file.
-        file: path, for errors.
+        layout: layout of the file if it is read as a long table, with the header cells and notes of the wide table.
         vocabulary: known column names, by which a header has a role such as "force".
 
     Raises:
@@ -301,9 +298,8 @@ def _long_table(
     if not is_named or any(len(axis) > 1 for axis in axes):
         raise MeasurementError(
             **ERRORS["two_levels" if is_named else "no_quantity"],
-            file=file,
             place=f'sheet "{source.sheet}"' if source.sheet else f"line {columns[0].points[0][0] - 1}",
-            found=", ".join(dict.fromkeys(filter(None, texts))),
+            found=", ".join(dict.fromkeys(layout.written)),
         )
 
     several, rows = len({column.direction for column in columns}) > 1, list[KeyedValue]()
@@ -317,6 +313,4 @@ def _long_table(
         for role, unit, convention in chain(*axes)
     )
     keys = [*names, *["direction"] * several]
-    headers, numbers, content = spread(keys, rows)
-    layout = Layout("", tuple(headers), min(numbers) - 1, ("",) * len(headers), None)
-    return Sheet(source.sheet or "", content, numbers=numbers), layout
+    return spread(source, replace(layout, header_line=min(row.number for row in rows) - 1), keys, rows)
