@@ -95,26 +95,23 @@ def _steady_part(loop: Loop, time: Array, motion: Array) -> tuple[Loop, str | No
         loop: the whole record.
         time, motion: time [s] and displacement [m or rad] of every k-th row, from `_thin_rows`, (n,) each.
     """
-    spans = steady_spans(loop, time, motion)
-    longest = max(spans, key=lambda span: round(span.cycles), default=None)
-    # a ramp to a preload shifts the middle of the record away from that of its cycles
-    period = longest.period if longest else _period(time, motion)
-    if period is None or time[-1] - time[0] <= period:
-        return loop, None
-    holes = np.flatnonzero(np.diff(time) > HOLE * period)
-    if holes.size:
+    period = _period(time, motion)
+    holes = np.flatnonzero(np.diff(time) > HOLE * (period or np.inf))
+    if period and time[-1] - time[0] > period and holes.size:
         starts, ends = time[np.append(0, holes + 1)], time[np.append(holes, time.size - 1)]
         first, last = max(zip(starts, ends, strict=True), key=lambda part: part[1] - part[0])
         whole = _select_interval(loop, first, last)
         part, note = _steady_part(whole, *_thin_rows(whole))
         sentence = f"rows are missing; of {time[-1] - time[0]:.3g} s only {first:.4g} to {last:.4g} s are used"
         return part, sentence if note is None else f"{sentence}; in this part, {note}"
+    spans = steady_spans(loop, time, motion)  # even if a ramp to a preload shifts the middle of the record
+    longest = max(spans, key=lambda span: round(span.cycles), default=None)
     if longest is None:
         return loop, None
     first, last = longest.begin, longest.end
     if first > time[0] and longest.cycles > THREE_CYCLES:
         first += longest.period  # the first cycle after a run-in is not yet steady
-    gaps = [f"{gap:.3g} s" if gap > _BRIEF * period else "" for gap in (first - time[0], time[-1] - last)]
+    gaps = [f"{gap:.3g} s" if gap > _BRIEF * longest.period else "" for gap in (first - time[0], time[-1] - last)]
     if not any(gaps):
         return loop, None
     equal_cycles = sum(equal.cycles for equal in spans if equal is not longest)
