@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
-from collections import Counter, defaultdict
+from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -110,9 +110,9 @@ def command(files: tuple[Path, ...], name: str | None, no_input: bool, output: O
         output.print(
             "several bushings of one compound belong to [[bushings]], each with its sizes: bushfit manual campaign"
         )
-    for sentence, count in Counter(inspection.assumed for inspection in inspections).items():
-        if sentence:
-            output.print(f"{count} test{'s' * (count > 1)}: {sentence}")
+    for sentence in dict.fromkeys(inspection.assumed for inspection in inspections if inspection.assumed):
+        labels = [inspection.label for inspection in inspections if inspection.assumed == sentence]
+        output.print(f"{labels[0] if len(labels) == 1 else f'{len(labels)} tests'}: {sentence}")
     for reason in left_out:
         output.print(f"left out: {reason}")
     document: InspectionDocument = {
