@@ -94,5 +94,5 @@ def amount_precision(size: float, variance: float, *, one_sided: bool) -> float:
     log_share = 0.5 * np.log(variance / total) - 0.5 * size**2 / total
     if one_sided:
         log_share += log(2.0) + log_ndtr(size * SIZES / np.sqrt(variance * total))
-    share = np.exp(2.0 * (logsumexp(log_share) - log(SIZES.size)))
+    share = max(np.exp(2.0 * (logsumexp(log_share) - log(SIZES.size))), np.finfo(float).tiny)  # 0 for many times |K|
     return float(share / max(1.0 - share, 1e-12) / variance)
