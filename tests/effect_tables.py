@@ -37,7 +37,7 @@ def _tables() -> Iterator[str]:
         (
             (
                 f"`{m.name}`",
-                "wrong prefix" if m.scales else m.sentence.format(files="FILE"),
+                "wrong prefix" if m.scales else m.sentence.format(files="FILE", factor="FACTOR"),
                 f"`{m.equation}`",
                 "both" if len(m.kinds) > 1 else "".join(m.kinds) or "[bushing]",
             )

@@ -13,6 +13,7 @@ from bushfit.commands.respond import validation_files
 from bushfit.diagnosis import workflow
 from bushfit.diagnosis.document import DiagnosisFile
 from bushfit.diagnosis.record import Diagnosis, DiagnosisSettings, level_of
+from bushfit.effects.mistakes import get_mistake
 from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.errors import FitError
 from bushfit.fitting.prepared_campaign import PreparedCampaign
@@ -66,7 +67,7 @@ class DiagnosisOutput:
         is_open = any(level_of(entry.name) in ("record", "unresolved") for entry in causes)
         if self.diagnosis.measure_again or (self.diagnosis.verdict == "named" and not is_open):
             return []
-        return [entry.label for entry in causes]
+        return [entry.label for entry in causes if not ((kind := get_mistake(entry.name)) and kind.is_estimated)]
 
     @property
     def result(self) -> Result:

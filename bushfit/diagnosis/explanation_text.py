@@ -3,7 +3,7 @@
 from collections import defaultdict
 from collections.abc import Sequence
 
-import numpy as np
+from scipy.special import softmax
 
 from bushfit.caveat import join_names
 from bushfit.diagnosis.fits import misfit_covariance
@@ -44,6 +44,12 @@ def undecided_text(reported: Sequence[Composition]) -> str:
     return f"{sentence}; {common}" if shared else sentence
 
 
+def check_first(compositions: Sequence[Composition]) -> list[str]:
+    """Sentence that asks to check the recording mistakes in explanations, in a list that is empty without any."""
+    mistakes = {c.best.mistake.key: c.best.mistake.sentence for c in compositions if c.best.mistake}
+    return [f"check first whether {' or whether '.join(mistakes.values())}"] if mistakes else []
+
+
 def causes_text(candidates: Sequence[Composition], finding: Finding) -> list[str]:
     """List at most one sentence on the possible causes of a gap, beside the lines with their probabilities.
 
@@ -55,9 +61,8 @@ def causes_text(candidates: Sequence[Composition], finding: Finding) -> list[str
         If every reported explanation is a recording mistake, a sentence that asks to check them. Otherwise a sentence
         that there are neither candidates nor leads; else nothing.
     """
-    mistakes = {c.best.mistake.key if c.best.mistake else None: c.best.mistake for c in finding.reported}
-    if all(mistakes.values()):
-        return [f"check first whether {' or whether '.join(one.sentence for one in mistakes.values() if one)}"]
+    if all(composition.best.mistake for composition in finding.reported):
+        return check_first(finding.reported)
     return [] if candidates or finding.leads else ["no known effect explains the gap"]
 
 
@@ -109,9 +114,7 @@ def list_candidates(
         Candidates with the result of their refit and their probability, the highest score first.
     """
     base = search.base
-    log_posteriors = np.array([hypothesis.log_posterior for hypothesis in hypotheses])
-    weights = np.exp(log_posteriors - log_posteriors[0])
-    shares = (weights / weights.sum()).tolist()
+    shares = softmax([hypothesis.log_posterior for hypothesis in hypotheses]).tolist()
     candidates, probability = list[CandidateResult](), defaultdict[str, float](float)
     for hypothesis, share in zip(hypotheses, shares, strict=True):
         for name in {*hypothesis.effects}:

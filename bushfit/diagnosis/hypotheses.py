@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.special import softmax
 
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.explanations import Explanation
@@ -14,20 +15,22 @@ from bushfit.diagnosis.faulty_parts import FaultyPart, OutlierCluster
 from bushfit.diagnosis.laplace import laplace
 from bushfit.diagnosis.linear_model import LinearModel
 from bushfit.diagnosis.priors import LEVELS
-from bushfit.diagnosis.projected_columns import CompoundDeviation, SignatureSet
+from bushfit.diagnosis.projected_columns import SignatureSet
 from bushfit.diagnosis.recorded_tests import ExplanationColumns, RecordedTests
-from bushfit.diagnosis.recording_mistakes import RecordingMistake
-from bushfit.diagnosis.smooth_deviations import COMPOUND, compound_signature, fast_relaxation
+from bushfit.diagnosis.recording_mistakes import FACTOR_RANGE, RecordingMistake
+from bushfit.diagnosis.smooth_deviations import COMPOUND
 from bushfit.effects import get_effect, get_parameter, qualified_name
 from bushfit.effects.contract import Array
 from bushfit.fitting.problem import FitResult
 from bushfit.fitting.rig_class import ASSUMED, class_errors
-from bushfit.gaussian_process import MINIMUM_VARIANCE
-from bushfit.model.covariance import Covariance
+from bushfit.model.covariance import Z95, Covariance
 
 #: Natural log of the odds below the best at which a noise case is left out; chosen for time: a case of relative weight
 #: e^-8 changes no verdict.
 _NEAR = 8.0
+#: Standard deviation of the normal distribution of the natural log of an estimated factor, around its best value, that
+#: has the density of the uniform distribution over `FACTOR_RANGE`.
+_FACTOR_SIZE = np.ptp(FACTOR_RANGE) / np.sqrt(2.0 * np.pi)
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,9 +190,10 @@ class SearchState:
         """Residuals linearised at the fit, to compute the evidence for further explanations."""
         fit, moves, columns = self.unwhitened, self.has_influence, self.columns
         precision = np.array([self.precision.get(name, 0.0) for name in fit.names])[moves]
-        common = [part for part in self.faulty_parts if part.form != "points"]
-        rows = np.concatenate([fit.jacobian[moves], *(part.columns for part in common)])
-        precision = np.concatenate([precision, *(np.full(len(part.columns), part.amount**-2) for part in common)])
+        common = [(part.columns, part.amount) for part in self.faulty_parts if part.form != "points"]
+        common.append((self.tests.factor_column(fit), _FACTOR_SIZE))
+        rows = np.concatenate([fit.jacobian[moves], *(columns for columns, _ in common)])
+        precision = np.concatenate([precision, *(np.full(len(columns), amount**-2) for columns, amount in common)])
         return LinearModel(fit.residual, rows, precision, columns.errors, columns.compound)
 
     @cached_property
@@ -239,33 +243,36 @@ class SearchState:
         Returns:
             Change of the whitened residuals per standard deviation, (c, n); None without faulty parts and deviation.
         """
-        columns = []
+        columns = [_FACTOR_SIZE * self.tests.factor_column(self.tests.base)]
         for part in self.faulty_parts:
             fitted = self.tests.faulty_parts_in_fits[part.name]
             columns.append(part.amount * fitted.in_form(part.form).columns)
         compound = self.tests.compound_in_fits if deviation else None
         columns += [deviation * compound.whole] if compound else []
-        return np.concatenate(columns) if columns else None
+        return np.concatenate(columns) if sum(map(len, columns)) else None
 
     @cached_property
     def parameters(self) -> tuple[dict[str, float], Covariance]:
         """Posterior means [SI] and covariance of the parameters that are not at a bound.
 
-        The covariance allows for errors of the rig, for a smooth deviation of the rubber from its model, and for a
-        relaxation of the rubber above the tested frequencies.
+        The covariance allows for errors of the rig and for a smooth deviation of the rubber from its model.
         """
-        fit, values, rig = self.unwhitened, self.unwhitened.model.values, self.columns.errors
-        rig = replace(rig, cases=[rig.cases[n] for n in self._likely_cases])
-        signature = compound_signature(fit, MINIMUM_VARIANCE)
-        linear = replace(self.linear, rig=rig, compound=CompoundDeviation(signature, rig) if signature else None)
-        moves = self.has_influence
+        fit, values, moves = self.unwhitened, self.unwhitened.model.values, self.has_influence
         slopes, count = fit.coordinates.slopes(values)[moves], np.count_nonzero(moves)
         names = tuple(np.array(fit.names)[moves].tolist())
-        mean, covariance = linear.posterior_parameters(fast_relaxation(fit)[0][0])
+        mean, covariance = self.linear.posterior_parameters()
         steps = dict(zip(names, slopes * mean[:count], strict=True))
         means = {name: float(np.clip(values[name] + x, *get_parameter(name).bounds)) for name, x in steps.items()}
         fitted = Covariance(names, covariance[:count, :count] * np.outer(slopes, slopes))
         return means, fitted.select([name for name in names if name not in fit.at_bound])
+
+    def refined_mistake(self) -> RecordingMistake:
+        """Recording mistake of these tests, with the estimated factor and its 95 % interval from all parameters."""
+        assert self.tests.mistake is not None
+        mean, covariance = self.linear.posterior_parameters()
+        ends = mean[-1] + np.array([-Z95, 0.0, Z95]) * np.sqrt(covariance[-1, -1])
+        low, middle, high = np.exp(ends) / self.tests.mistake.kind.force
+        return replace(self.tests.mistake.with_force(1.0 / middle), interval=(low, high))
 
     def weigh(self, sets: Sequence[SignatureSet]) -> list[Evidence]:
         """Evidence of the tests for further explanations, averaged over the likely sizes of the rig's errors.
@@ -329,8 +336,7 @@ def mean_parameters(hypotheses: Sequence[Hypothesis], names: Sequence[str]) -> t
     """
     log_posteriors = np.array([hypothesis.log_posterior for hypothesis in hypotheses])
     near = np.flatnonzero(log_posteriors > log_posteriors.max() - _NEAR).tolist()
-    weights = np.exp(log_posteriors[near] - log_posteriors.max())
-    weights /= weights.sum()
+    weights = softmax(log_posteriors[near])
     states = [hypotheses[n].state for n in near]
     pairs = [({**state.fit.model.values, **state.parameters[0]}, state.parameters[1]) for state in states]
     means = np.array([[values[name] for name in names] for values, _ in pairs])

@@ -23,7 +23,6 @@ from scipy.special import chdtrc, softmax
 
 from bushfit.diagnosis.evidence import Evidence, block_gains, largest_gain, mean_evidence, posterior
 from bushfit.diagnosis.explanations import Signature
-from bushfit.diagnosis.priors import SIZES
 from bushfit.diagnosis.projected_columns import Batch, CompoundDeviation, RigRows, SignatureSet
 from bushfit.diagnosis.rig_errors import RigErrors
 from bushfit.effects.contract import Array
@@ -32,8 +31,6 @@ from bushfit.effects.contract import Array
 _ROUNDING = 1e-9
 #: Posterior weight of a noise case below which it changes no mean: rounding.
 _NEGLIGIBLE = 1e-15
-#: Largest prior size of an amount over a standard deviation that is nearly flat; it changes the amount by a permille.
-_SMALL = 0.03
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,8 +139,11 @@ class LinearModel:
         spread = np.sqrt(variance / grown)
         modes = spread[..., None] * compound.inner(rows, used)[index]
         gram = rows.inner(rows, used)[index] - modes.swapaxes(1, 2) @ modes
-        scale, information = _scale_information(gram[:, 1:, 1:], self.jacobian, self.precision)
-        root = np.linalg.cholesky(information)
+        # scaled to a diagonal of nearly 1, and invertible
+        squares = np.einsum("kn,kn->k", self.jacobian, self.jacobian) + self.precision
+        scale = np.sqrt(np.maximum(squares, np.finfo(float).tiny))
+        information = (gram[:, 1:, 1:] + np.diag(self.precision)) / np.outer(scale, scale)
+        root = np.linalg.cholesky(information + _ROUNDING * np.eye(scale.size))
         free = np.linalg.solve(root, gram[:, 1:, :1] / scale[:, None])
         misfit = gram[:, 0, 0] - np.sum(np.square(free[..., 0]), axis=1)
         parameters = np.linalg.solve(root.swapaxes(1, 2), free) / scale[:, None]
@@ -257,39 +257,21 @@ class LinearModel:
         freedom = max(self.residual.size - int(np.count_nonzero(self.precision == 0.0)), 1)
         return float(np.exp(base - np.logaddexp.reduce(base)) @ chdtrc(freedom, self.evidence_by_case[1]))
 
-    def posterior_parameters(self, relaxation: Array) -> tuple[Array, Array]:
+    def posterior_parameters(self) -> tuple[Array, Array]:
         """Posterior of the changes of the k parameters from their fitted values, averaged over noise cases.
-
-        Args:
-            relaxation: change of the n residuals by a relaxation of the rubber faster than the tests, (n,). A rubber
-                that deviates from the model may have one, with a size of `priors.SIZES`.
 
         Returns:
             Mean, (k,), and covariance within and between the noise cases, (k, k).
-
-        Notes: the amount of the relaxation is estimated with a nearly flat prior, as a with the variance c. For a prior
-        of variance v^2, the evidence is then multiplied by N(a; 0, c + v^2)/N(a; 0, c), the Savage-Dickey ratio.
         """
-        rows = np.concatenate((self.jacobian, relaxation[None]))
-        signatures = SignatureSet((Signature(rows, np.eye(len(rows)), act_together=True),), self.rig)
-        alone = replace(self, jacobian=self.jacobian[:0], precision=self.precision[:0]).project(self.cases)
-        ((_, projections, grams),) = alone.products(signatures)
-        wide = np.append(self.precision, np.square(_SMALL / SIZES[-1]))
-        scale, information = _scale_information(grams[:, 0], rows, wide)
-        covariance = np.linalg.inv(information) / np.outer(scale, scale)
-        shift = np.einsum("nij,nj->ni", covariance, projections[:, 0])
-        amount, variance, cross = shift[:, -1:], covariance[:, -1, -1:], covariance[:, :, -1]
-        deviates = self.rig.deviation[self.cases] > 0.0
-        total = variance + np.square(SIZES) * deviates[:, None]  # (cases, sizes)
-        base = np.where(self.rig.is_plain[self.cases] | deviates, self.evidence_by_case[0], -np.inf)
-        gain = 0.5 * (np.log(variance / total) + np.square(amount) * (1.0 / variance - 1.0 / total))
-        share = softmax(base[:, None] + gain)
-        means = shift[:, None] - cross[:, None] * (amount / total)[..., None]
-        mean = np.einsum("ns,nsi->i", share, means)
-        matrix = np.einsum("n,nij->ij", share.sum(axis=1), covariance)
-        matrix -= np.einsum("n,ni,nj->ij", np.sum(share / total, axis=1), cross, cross)
-        matrix += np.einsum("ns,nsi,nsj->ij", share, means - mean, means - mean)
-        return -mean[:-1], matrix[:-1, :-1]
+        projection = self.project(self.cases)
+        root, scale = projection.root
+        inverse = np.linalg.inv(root) / scale
+        is_possible = self.rig.is_plain[self.cases] | (self.rig.deviation[self.cases] > 0.0)
+        share = softmax(np.where(is_possible, projection.base, -np.inf))
+        means = np.einsum("cij,ci->cj", inverse, projection.free)
+        mean = share @ means
+        matrix = np.einsum("c,cji,cjk->ik", share, inverse, inverse)
+        return -mean, matrix + np.einsum("c,ci,cj->ij", share, means - mean, means - mean)
 
     def posterior_amounts(self, signatures: SignatureSet, cases: Array) -> tuple[Array, Array]:
         """Posterior mean and covariance of the amounts (coefficients) of the g columns of each of b explanations.
@@ -308,18 +290,3 @@ class LinearModel:
         mean = np.einsum("nbs,nbsi->bi", share, means)
         spread = np.einsum("nbij,nbj,nbkj->bik", vectors, np.einsum("nbs,nbsj->nbj", share, variances), vectors)
         return mean, spread + np.einsum("nbs,nbsi,nbsj->bij", share, means - mean[:, None], means - mean[:, None])
-
-
-def _scale_information(grams: Array, rows: Array, precision: Array) -> tuple[Array, Array]:
-    """Scale the information matrices of k parameters to a diagonal of nearly 1, and make them invertible.
-
-    Args:
-        grams: information matrix (inverse covariance) in each noise case, (cases, k, k).
-        rows: derivatives of the residuals with respect to the parameters, (k, n).
-        precision: prior precision (inverse variance) of each parameter, (k,).
-
-    Returns:
-        Scale of each parameter, (k,), and the scaled information matrices, (cases, k, k).
-    """
-    scale = np.sqrt(np.maximum(np.einsum("kn,kn->k", rows, rows) + precision, np.finfo(float).tiny))
-    return scale, (grams + np.diag(precision)) / np.outer(scale, scale) + _ROUNDING * np.eye(scale.size)

@@ -13,7 +13,13 @@ from bushfit.diagnosis.faulty_parts import FaultyPart, find_faulty_parts
 from bushfit.diagnosis.projected_columns import CompoundDeviation, SignatureSet
 from bushfit.diagnosis.recording_mistakes import RecordingMistake
 from bushfit.diagnosis.rig_errors import RigErrors, in_scatter_units, rig_errors
-from bushfit.diagnosis.smooth_deviations import POWER_LAW, compound_signature, power_laws, unnamed_curves
+from bushfit.diagnosis.smooth_deviations import (
+    POWER_LAW,
+    compound_signature,
+    power_laws,
+    residual_changes,
+    unnamed_curves,
+)
 from bushfit.effects.contract import Array
 from bushfit.effects.mistakes import USUAL_MODULUS
 from bushfit.fitting.problem import FitResult
@@ -83,6 +89,13 @@ class RecordedTests:
     def faulty_parts_in_fits(self) -> dict[str, FaultyPart]:
         """Faulty parts of the tests by name, with changes of the whitened residuals of a fit."""
         return {part.name: part for part in find_faulty_parts(self.base)}
+
+    def factor_column(self, fit: FitResult) -> Array:
+        """Change of the residuals of a fit if the estimated factor of a mistake grows by 100 %, (1, n); else (0, n)."""
+        if self.mistake is None or not self.mistake.kind.is_estimated:
+            return np.empty((0, fit.residual.size))
+        tests = [fit.data_sets[index] for index in self.mistake.tests]
+        return residual_changes(fit, tests, np.ones((1, sum(test.frequency.size for test in tests))))
 
 
 @dataclass(frozen=True, eq=False)

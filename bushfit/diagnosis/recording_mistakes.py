@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.ndimage import zoom
+from scipy.optimize import minimize_scalar
 
 from bushfit.caveat import Caveat, join_names
 from bushfit.effects import BASE
@@ -24,6 +25,7 @@ from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.geometry import Bushing, Place, stiffness_per_modulus, unit_strain
 from bushfit.model.model import Model
 from bushfit.reading.measurement import Loop, Sweep
+from bushfit.units import format_aligned
 
 #: Values of alpha that are tried before any fit: those of all rubbers.
 _ALPHA = np.linspace(0.05, 0.6, 10)
@@ -33,6 +35,8 @@ _EPS_HALF = np.geomspace(2e-4, 0.2, 24)
 _FINER = 5
 #: Least relative error of a point before any fit: the error of the grid of values.
 _COARSE = 1e-3
+#: Range of the natural log of an unknown factor: one decade each way. Larger factors are powers of 1000.
+FACTOR_RANGE = (-np.log(10.0), np.log(10.0))
 #: Maximum number of points of a test that are used before any fit: enough to show the shape of its curves.
 _MOST_POINTS = 60
 #: Misfit with a mistake corrected, relative to the misfit of the tests as recorded, up to which a fit follows; above 1
@@ -52,11 +56,13 @@ class RecordingMistake:
         data: the campaign as it was read.
         kind: kind of mistake, such as amplitudes stated peak-to-peak, with its correction.
         tests: indices of the affected tests, loops before sweeps; empty for a mistake in [bushing].
+        interval: 95 % interval of the factor by which the forces are wrong, if that is estimated; else None.
     """
 
     data: PreparedCampaign
     kind: Mistake
     tests: tuple[int, ...]
+    interval: tuple[float, float] | None = None
 
     @property
     def key(self) -> tuple[str, tuple[int, ...]]:
@@ -80,7 +86,9 @@ class RecordingMistake:
         files = [file_or_name(test.test) for test in self.affected_tests]
         if len({*files}) < len(files):
             files = [test.name for test in self.affected_tests]
-        return self.kind.sentence.format(files=join_names(files))
+        factor, *ends = format_aligned([1.0 / self.kind.force, *(self.interval or ())], 3)
+        factor += f" (95 % interval {ends[0]} to {ends[1]})" if ends else ""
+        return self.kind.sentence.format(files=join_names(files), factor=factor)
 
     @property
     def corrections(self) -> tuple[str, ...]:
@@ -88,6 +96,10 @@ class RecordingMistake:
         return tuple(self.kind.correction_line(test.test) for test in self.affected_tests) or (
             self.kind.correction_line(None),
         )
+
+    def with_force(self, ratio: float) -> RecordingMistake:
+        """Return this mistake with another ratio of the true to the stated force."""
+        return replace(self, kind=replace(self.kind, force=ratio))
 
     def corrected_campaign(self) -> PreparedCampaign:
         """Correct this mistake in a copy of the campaign: in the affected tests, or in the dimensions of the bushing.
@@ -127,14 +139,14 @@ def correct_adopted(data: PreparedCampaign, names: Collection[str]) -> tuple[Pre
     """
     messages = []
     for name in names:
-        kind = get_mistake(name)
-        possible = {mistake.labels: mistake for mistake in possible_mistakes(data, ()) if mistake.kind is kind}
+        mistakes = [mistake for mistake in possible_mistakes(data, ()) if not mistake.kind.is_estimated]
+        possible = {mistake.labels: mistake for mistake in mistakes if mistake.kind is get_mistake(name)}
         if (mistake := possible.get((name,))) is None:
             expected = ", ".join(labels[0] for labels in possible if len(labels) == 1)
             raise ModelError(
-                "this mistake is not possible in this test",
+                "this mistake cannot be corrected in this test",
                 found=name,
-                expected=f"one of {expected}" if expected else "another mistake: this one is not possible in any test",
+                expected=f"one of {expected}" if expected else "another mistake: this one is corrected in no test",
             )
         sentence = f"read as if {mistake.sentence}; {mistake.corrections[0]}"
         messages.append(Caveat("corrected_record", sentence).about(f"corrected by --adopt {name}"))
@@ -174,7 +186,10 @@ def possible_mistakes(data: PreparedCampaign, without: Collection[str]) -> list[
         ]
         groups: list[tuple[int, ...]] = [(index,) for index in indices]
         groups += [tuple(index for index in indices if mark in shared[index]) for mark in marks]
-        found += [RecordingMistake(data, kind, group) for group in dict.fromkeys([*groups, tuple(indices)]) if group]
+        # a factor of one half of the tests is the inverse factor of the other half: the smaller half is listed
+        limit = len(data_sets) if kind.is_estimated else np.inf
+        distinct = filter(None, dict.fromkeys([*groups, tuple(indices)]))
+        found += [RecordingMistake(data, kind, group) for group in distinct if 2 * len(group) - (0 in group) < limit]
     return found
 
 
@@ -206,6 +221,7 @@ class MistakeScreening:
         Returns:
             At most `limit` mistakes, by increasing misfit after correction.
         """
+        candidates = [self._with_factor(mistake) if mistake.kind.is_estimated else mistake for mistake in candidates]
         before, misfits = self.misfit(None), np.array([self.misfit(mistake) for mistake in candidates])
         changed = np.abs(misfits - before) > _LEAST_CHANGE * before
         smallest, selected = dict[tuple[int, ...], float](), list[RecordingMistake]()
@@ -214,6 +230,11 @@ class MistakeScreening:
             if changed[index] and misfit < _LARGEST_RATIO * min(before, smallest.setdefault(mistake.tests, misfit)):
                 selected.append(mistake)
         return selected[:limit]
+
+    def _with_factor(self, mistake: RecordingMistake) -> RecordingMistake:
+        """Estimate the unknown factor of a mistake, by the smallest misfit."""
+        best = minimize_scalar(lambda log: self.misfit(mistake.with_force(np.exp(log))), bounds=FACTOR_RANGE)
+        return mistake.with_force(float(np.exp(best.x)))
 
     def misfit(self, mistake: RecordingMistake | None) -> float:
         """Smallest sum of squared residuals of the five-parameter model (mu, m, alpha, sigma_fmax, eps_half).
@@ -256,6 +277,9 @@ class MistakeScreening:
             Inner products over the points of the test, for g pairs of alpha and eps_half, (g, 4, 4), of four rows: the
             stiffness per unit of mu, of m and of sigma_fmax, and the measured stiffness.
         """
+        if mistake and mistake.is_estimated:
+            scale = np.array([*[1.0 / mistake.force] * 3, 1.0])
+            return self._test_products(index, data_set, None, bushing) * np.outer(scale, scale)
         key = (index, mistake.name if mistake else "", bushing)
         if key not in self._products:
             direction, frequency, amplitude, stiffness, error = _corrected_points(data_set, mistake)
@@ -301,13 +325,10 @@ def _corrected_points(data_set: MeasuredTest, mistake: Mistake | None) -> tuple[
     """
     if isinstance(data_set, MeasuredSweep):
         sweep, noise = data_set.test, np.hypot(data_set.relative_noise, max(data_set.noise.shared))
-        mended = (mistake and mistake.corrected_test(sweep)) or sweep
     else:
-        sweep, noise = (
-            Sweep(data_set.name, data_set.direction, data_set.frequency, data_set.amplitude, data_set.measured),
-            data_set.gain_error,
-        )
-        mended = mistake.corrected_harmonic(sweep) if mistake else sweep
+        columns = data_set.frequency, data_set.amplitude, data_set.measured
+        sweep, noise = Sweep(data_set.name, data_set.direction, *columns), data_set.gain_error
+    mended = mistake.corrected_test(sweep) if mistake else sweep
     points = np.stack((mended.frequency, mended.amplitude_reached))
     distinct, index, count = np.unique(points, axis=1, return_inverse=True, return_counts=True)
     index = index.ravel()

@@ -16,6 +16,7 @@ from bushfit.diagnosis.closing import ClosedGap, close_gap, without_assumed_gain
 from bushfit.diagnosis.document import Verdict
 from bushfit.diagnosis.explanation_text import (
     causes_text,
+    check_first,
     explanation_odds,
     format_amount,
     leads_text,
@@ -35,6 +36,7 @@ from bushfit.diagnosis.search import Search
 from bushfit.diagnosis.verdict import LEVELS, NAMELESS, Composition, Finding, decide_verdict
 from bushfit.effects import get_effect, get_parameter, qualified_name
 from bushfit.effects.unnamed import NAME as UNNAMED
+from bushfit.fitting.agreement import prior_uses, prior_warnings
 from bushfit.fitting.problem import FitResult
 from bushfit.model.model import Model
 from bushfit.model.result import Result
@@ -88,11 +90,8 @@ class DiagnosisWriter:
             return replace(self, finding=revised).diagnosis() if revised else diagnosis
         if (holdout := closing.holdout) and (holdout.after or np.inf) >= (holdout.before or 0.0):
             return replace(self, finding=replace(self.finding, names=())).diagnosis()
-        return (
-            self._undecided_diagnosis(first, closing)
-            if verdict == "ambiguous"
-            else self._nameless_diagnosis(first, closing)
-        )
+        write = self._undecided_diagnosis if verdict == "ambiguous" else self._nameless_diagnosis
+        return write(first, closing)
 
     def _named_diagnosis(self, first: Composition, closing: ClosedGap) -> Diagnosis:
         """Diagnosis in which named effects explain the gap, or part of it with a description of the rest."""
@@ -152,7 +151,7 @@ class DiagnosisWriter:
         candidates = self._candidates
         leader = candidates[0] if candidates else first
         rest = "the rest of the gap" if self.finding.names else "the gap"
-        sentences = [undecided_text(reported)]
+        sentences = [*check_first(candidates), undecided_text(reported)]
         sentences += [f"a smooth correction closes {rest}: {gap.sentence}"] if gap else []
         rivals = tuple(composition for composition in reported if composition is not leader)
         entries = self._record_entries(leader, rivals)
@@ -188,6 +187,8 @@ class DiagnosisWriter:
             advice = _LEVELS_ADVICE
         else:
             sentences = [*dict.fromkeys(["no known effect explains the gap", *causes, *place])]
+            if not find_regions(self.base):  # a prior may be the gap
+                sentences = [warning.text for warning in prior_warnings(prior_uses([self.base], None))] or sentences
         entries = [NamedCause(UNNAMED, gap.evidence, tuple(candidates))] if gap else []
         faulty = first.best if is_faulty else None
         reported: Verdict = "described" if gap else "unexplained"
@@ -226,8 +227,8 @@ class DiagnosisWriter:
         if (mistake := composition.best.mistake) is None:
             return []
         gain = self.search.base.chi_square - composition.best.state.plain.chi_square
-        why = f"lowers chi-square by {gain:.0f} without a new parameter; "
-        why += probability_text(mistake.labels[0], self.finding)
+        parameter = "with one parameter" if mistake.kind.is_estimated else "without a new parameter"
+        why = f"lowers chi-square by {gain:.0f} {parameter}; {probability_text(mistake.labels[0], self.finding)}"
         singles = [replace(mistake, tests=(index,)) for index in mistake.tests] or [mistake]
         return [
             NamedCause(

@@ -27,9 +27,10 @@ from bushfit.diagnosis.projected_columns import SignatureSet
 from bushfit.diagnosis.propose import Proposal, has_used_parameters, proposals
 from bushfit.diagnosis.record import DiagnosisSettings
 from bushfit.diagnosis.recorded_tests import RecordedTests, modulus_deviation, record_change
-from bushfit.diagnosis.recording_mistakes import MistakeScreening, possible_mistakes
+from bushfit.diagnosis.recording_mistakes import MistakeScreening, RecordingMistake, possible_mistakes
 from bushfit.diagnosis.smooth_deviations import COMPOUND, POWER_LAW
 from bushfit.diagnosis.verdict import decide_verdict
+from bushfit.effects.contract import Array
 from bushfit.effects.mistakes import get_mistake
 from bushfit.errors import FitError, ModelError
 from bushfit.fitting.prepared_campaign import PreparedCampaign
@@ -38,8 +39,8 @@ from bushfit.progress import track
 
 #: Maximum number of refits of hypotheses that are probable by the linear model alone; for time.
 _LAST_REFITS = 8
-#: Number of mistakes that are fitted, and that are combined with effects in each round, the most promising first; and
-#: number of faulty parts added to a state; for time.
+#: Number of mistakes that are fitted; of those that are combined with effects, or whose factor is estimated, the most
+#: promising first; and of faulty parts added to a state; for time.
 _MISTAKES, _CORRECTED, _FAULTY_PARTS = 4, 2, 2
 #: Natural log of the odds below its state within which an effect is refitted; for time.
 _SLIGHT = 3.0
@@ -137,7 +138,7 @@ class Search:
             fresh = self._with_common_start([*beam, *fresh])[len(beam) :]
             if depth == 0:
                 fresh += self._corrected_records()
-                if self._is_power_law():
+                if self._is_decided(by_power_law=True):
                     break
             followed = [h for h in self._known.values() if h.unnamed in ("", COMPOUND) and not h.has_level_errors]
             limit = max(hypothesis.log_posterior for hypothesis in followed) - LOG_ODDS_CUTOFF
@@ -164,21 +165,20 @@ class Search:
         """Hypotheses about the gap that the search has recorded so far, the most probable first."""
         return sorted(self._known.values(), key=lambda hypothesis: -hypothesis.log_posterior)
 
-    def _is_decided(self) -> bool:
-        """True if one explanation, or that nothing is missing, has a probability of 97 % or more and fits the tests."""
-        finding = decide_verdict(self._ordered_hypotheses(), self.settings.tolerance)
-        if finding.verdict == "consistent":
-            return finding.nothing >= NAMED and self.root.linear.p_value() >= DOES_NOT_FIT
-        return finding.verdict == "named" and finding.reported[0].best.is_refitted
+    def _is_decided(self, *, by_power_law: bool = False) -> bool:
+        """True if one explanation, or that nothing is missing, has a probability of 97 % or more and fits the tests.
 
-    def _is_power_law(self) -> bool:
-        """True if a power law alone has a probability of 97 % or more and fits the tests, so that the search ends."""
+        Args:
+            by_power_law: True if only a power law alone ends the search.
+        """
         finding = decide_verdict(self._ordered_hypotheses(), self.settings.tolerance)
         if finding.verdict == "consistent":
-            return False
-        best = finding.reported[0].best
-        is_power_law = best.last is not None and best.last.family == POWER_LAW and len(best.key) == 1
-        return is_power_law and finding.reported[0].probability >= NAMED and best.p_value >= DOES_NOT_FIT
+            return not by_power_law and finding.nothing >= NAMED and self.root.linear.p_value() >= DOES_NOT_FIT
+        first, best = finding.reported[0], finding.reported[0].best
+        if by_power_law:
+            is_alone = best.last is not None and best.last.family == POWER_LAW and len(best.key) == 1
+            return is_alone and first.probability >= NAMED and best.p_value >= DOES_NOT_FIT
+        return finding.verdict == "named" and best.is_refitted
 
     def _unrefitted_hypotheses(self) -> Iterator[Hypothesis]:
         """Yield the most probable hypotheses whose evidence is from the linear model, one by one, to be refitted."""
@@ -315,18 +315,26 @@ class Search:
         """Yield refitted states without one of the earlier effects, which the last effect may make unnecessary."""
         for name in () if state.faulty_parts else state.effects[:-1]:
             model = state.fit.model.without(name)
-            if state.key - {name} in self._visited or not all(has_used_parameters(e, model) for e in model.records):
-                continue
-            for fit in fit_rivals(self._start_rivals({name: model}, state.fit.data_sets, {})).values():
-                with suppress(ModelError):  # as in `_with_effects`
-                    yield self._visit(self._with_fit(state, [e for e in state.effects if e != name], fit))
+            if state.key - {name} not in self._visited and all(has_used_parameters(e, model) for e in model.records):
+                yield from self._refit(state, [effect for effect in state.effects if effect != name], {}, None)
 
-    def _with_fit(self, state: SearchState, effects: Sequence[str], fit: FitResult) -> SearchState:
-        """Build a state of the search with the tests of `state`, from a fit of several effects, given by name."""
-        fitted = SearchState.of_tests(state.tests).with_fit(fit)
-        for name in effects:
-            fitted = fitted.with_effect(name, self._log_odds("effect", name), fit)
-        return fitted
+    def _refit(
+        self, state: SearchState, effects: Sequence[str], start: Mapping[str, float], columns: Array | None
+    ) -> Iterator[SearchState]:
+        """Refit a state of the search with some of its effects, and yield the new state.
+
+        Args:
+            state: state with the tests.
+            effects: names of the effects to keep.
+            start, columns: further starting values and errors that tests share, see `start_rivals` and `fit_rivals`.
+        """
+        model = state.fit.model.without(*{*state.effects} - {*effects})
+        for fit in fit_rivals(self._start_rivals({"": model}, state.fit.data_sets, start), columns).values():
+            fitted = SearchState.of_tests(state.tests).with_fit(fit)
+            with suppress(ModelError):  # as in `_with_effects`
+                for name in effects:
+                    fitted = fitted.with_effect(name, self._log_odds("effect", name), fit)
+                yield self._visit(fitted)
 
     def _with_common_start(self, states: list[SearchState]) -> list[SearchState]:
         """Refit the states of a round, starting from the most probable one, so that all are compared near one minimum.
@@ -344,27 +352,33 @@ class Search:
         near = [n for n, state in enumerate(states) if state is not leader and not state.faulty_parts]
         near.sort(key=lambda n: -states[n].log_posterior)
         for n in near[:_RIVALS] if leader.likeliest_deviation and not leader.faulty_parts else ():
-            state, start = states[n], leader.fit.model.values
-            starts = self._start_rivals({"": state.fit.model}, state.fit.data_sets, start)
-            for fit in fit_rivals(starts, state.free_columns(leader.likeliest_deviation)).values():
-                with suppress(ModelError):  # as in `_with_effects`
-                    candidate = self._visit(self._with_fit(state, state.effects, fit))
-                    states[n] = max(state, candidate, key=lambda rival: rival.log_posterior)
+            columns, values = states[n].free_columns(leader.likeliest_deviation), leader.fit.model.values
+            for fitted in self._refit(states[n], states[n].effects, values, columns):
+                states[n] = max(states[n], fitted, key=lambda state: state.log_posterior)
         return states
 
     def _corrected_records(self) -> Iterator[SearchState]:
         """Generate states in which one recording mistake is corrected, the most promising first."""
-        possible = possible_mistakes(self.data, self.settings.without)
-        for mistake in track("mistakes corrected", list(MistakeScreening(self.data).best(possible, _MISTAKES))):
+        possible, select = possible_mistakes(self.data, self.settings.without), MistakeScreening(self.data).best
+        known, estimated = ([m for m in possible if m.kind.is_estimated is flag] for flag in (False, True))
+        for mistake in track("mistakes corrected", [*select(known, _MISTAKES), *select(estimated, _CORRECTED)]):
             with suppress(FitError, ModelError):  # the model cannot be fitted to the corrected tests
-                fit = self.fit_corrected(mistake.corrected_campaign())
-                if [test.size for test in fit.data_sets] == [test.size for test in self.base.data_sets]:
-                    log_odds = log(ODDS["record"] / len(possible))
-                    log_odds -= 0.5 * (modulus_deviation(fit) ** 2 - modulus_deviation(self.base) ** 2)
-                    change = record_change(self.base, fit)
-                    tests = RecordedTests.of_fit(fit, self.data.campaign.rig)
-                    tests = replace(tests, log_odds=log_odds, mistake=mistake, change=change)
-                    yield self._visit(SearchState.of_tests(tests))
+                log_odds = log(ODDS["record"] / len(possible))
+                state = self._corrected_record(mistake, log_odds)
+                if mistake.kind.is_estimated:  # by all parameters
+                    state = self._corrected_record(state.refined_mistake(), log_odds)
+                if [test.size for test in state.fit.data_sets] == [test.size for test in self.base.data_sets]:
+                    yield self._visit(state)
+
+    def _corrected_record(self, mistake: RecordingMistake, log_odds: float) -> SearchState:
+        """Fit the starting model to tests with a corrected mistake, whose prior odds have the natural log `log_odds`.
+
+        Raises: FitError or ModelError if the model cannot be fitted.
+        """
+        fit = self.fit_corrected(mistake.corrected_campaign())
+        log_odds -= 0.5 * (modulus_deviation(fit) ** 2 - modulus_deviation(self.base) ** 2)
+        tests, change = RecordedTests.of_fit(fit, self.data.campaign.rig), record_change(self.base, fit)
+        return SearchState.of_tests(replace(tests, log_odds=log_odds, mistake=mistake, change=change))
 
 
 def prior_odds(explanations: Sequence[Explanation]) -> dict[tuple[str, str], float]:

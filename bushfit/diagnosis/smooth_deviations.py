@@ -40,7 +40,7 @@ COMPOUND = "compound"
 POWER_LAW = "power law"
 #: Minimum variance of a pattern of the compound's deviation relative to the largest: the patterns left out are together
 #: less than a tenth of the deviation (standard deviation) at each operating point.
-_MINIMUM_VARIANCE = 3e-4
+_PATTERNS = {"minimum": 3e-4}
 #: Fraction of the compound's deviation that changes over the shorter lengths of a smooth curve: yield and breakdown set
 #: in within a factor of 2 or 3 of the strain.
 _COMPOUND_ROUGHNESS = 0.25
@@ -66,14 +66,13 @@ _STRAIN_ERROR, _STRAIN_STEP = 5.0, 1e-3
 _STIFFNESS_ERROR = 0.5
 
 
-def compound_signature(fit: FitResult, minimum: float = _MINIMUM_VARIANCE) -> Signature | None:
+def compound_signature(fit: FitResult) -> Signature | None:
     """Changes of the residuals if the modulus of the rubber compound deviates smoothly from the model's laws.
 
     The relative deviation is a Gaussian process over frequency and strain, the same in all directions and specimens.
 
     Args:
         fit: fitted model and tests.
-        minimum: variance, relative to the largest pattern's, at or below which a pattern is left out.
 
     Returns:
         Signature with one column for each independent pattern of the deviation (together of unit variance at each
@@ -81,7 +80,7 @@ def compound_signature(fit: FitResult, minimum: float = _MINIMUM_VARIANCE) -> Si
     """
     if not fit.data_sets:
         return None
-    smooth = _smooth_changes(fit, fit.data_sets, COMPOUND_LENGTHS, minimum=minimum, correlate=_compound_correlation)
+    smooth = _smooth_changes(fit, fit.data_sets, COMPOUND_LENGTHS, correlate=_compound_correlation, **_PATTERNS)
     columns, changes = map(np.concatenate, zip(smooth, _formula_changes(fit), fast_relaxation(fit), strict=True))
     for loops in group_repeats(split_by_kind(fit.data_sets)[0]):
         columns = np.concatenate((columns, _repeat_changes(fit, loops, compound_shapes)))
@@ -101,7 +100,7 @@ def _formula_changes(fit: FitResult) -> tuple[Array, Array]:
     model, tests = fit.model, fit.data_sets
     directions = list(dict.fromkeys(test.direction for test in tests))
     directions = directions if len(directions) > 1 else []
-    columns, changes = np.zeros((2 * len(directions), fit.residual.size)), list[Array]()
+    changes = list[Array]()
     for test in tests:
         stiffness, nearby = (
             model.stiffness(test.direction, test.frequency, scale * test.amplitude, kind=test.kind)
@@ -109,10 +108,9 @@ def _formula_changes(fit: FitResult) -> tuple[Array, Array]:
         )
         acts = np.array([direction == test.direction for direction in directions], dtype=float)
         errors = _STRAIN_ERROR * (nearby / stiffness - 1.0) / _STRAIN_STEP, np.full_like(stiffness, _STIFFNESS_ERROR)
-        change = np.kron(acts[:, None], errors)
-        columns[:, fit.residual_rows[test]] = test.residual_change(change * stiffness, model)
-        changes.append(change)
-    return columns, np.concatenate(changes, axis=-1)
+        changes.append(np.kron(acts[:, None], errors))
+    change = np.concatenate(changes, axis=-1)
+    return residual_changes(fit, tests, change), change
 
 
 def fast_relaxation(fit: FitResult) -> tuple[Array, Array]:
@@ -135,7 +133,7 @@ def fast_relaxation(fit: FitResult) -> tuple[Array, Array]:
         for t, factor in zip(tests, factors, strict=True)
     ]
     change = np.concatenate(changes)[None]
-    return _residual_changes(fit, tests, change), change
+    return residual_changes(fit, tests, change), change
 
 
 def _compound_correlation(points: Array, nodes: Array) -> Array:
@@ -201,7 +199,7 @@ def unnamed_curves(fit: FitResult) -> list[Explanation]:
         span = fit.row_span(sweeps), fit.residual.size
         for direction, masks in directions.items():
             of_direction = np.concatenate([changes * points for points in masks])
-            of_rows = _residual_changes(fit, sweeps, of_direction)[:, span[0]].copy()
+            of_rows = residual_changes(fit, sweeps, of_direction)[:, span[0]].copy()
             curves[f"{roughness} {direction}"] = Signature(of_rows, of_direction, act_together=True, covered_rows=span)
         if roughness == "rough" and len(directions) > 1:  # a smooth curve in all directions is the compound's
             curves["rough all"] = Signature(columns[:, span[0]].copy(), changes, act_together=True, covered_rows=span)
@@ -240,7 +238,7 @@ def power_laws(fit: FitResult) -> list[Explanation]:
     for scope, change in scopes.items():
         shapes = laws * change
         shapes /= np.abs(shapes).max(axis=1, keepdims=True)
-        columns = _residual_changes(fit, tests, np.concatenate((shapes, 1j * shapes)))
+        columns = residual_changes(fit, tests, np.concatenate((shapes, 1j * shapes)))
         for (p, q), pair in zip(powers, columns.reshape(2, len(powers), -1).swapaxes(0, 1), strict=True):
             signature = Signature(pair, np.array([[1.0], [1.0j]]), act_together=True)
             explanations.append(Explanation("unnamed", POWER_LAW, f"f^{p} X^{q}, {scope}", signature))
@@ -265,10 +263,10 @@ def _smooth_changes(
     points = [coordinates(test.frequency, test.amplitude * fit.model.unit_strain(test.direction)) for test in tests]
     _, shapes = patterns(in_lengths(np.concatenate(points), lengths), **limits)
     changes = (shapes[:, None] * np.array([[1.0], [1.0j]])).reshape(-1, shapes.shape[-1])
-    return _residual_changes(fit, tests, changes), changes
+    return residual_changes(fit, tests, changes), changes
 
 
-def _residual_changes(fit: FitResult, tests: Sequence[MeasuredTest], changes: Array) -> Array:
+def residual_changes(fit: FitResult, tests: Sequence[MeasuredTest], changes: Array) -> Array:
     """Changes of the n whitened residuals due to c relative changes of the stiffness at all points of `tests`, (c, n).
 
     Args:

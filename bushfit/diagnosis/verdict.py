@@ -9,7 +9,7 @@ from itertools import combinations
 from typing import Any
 
 import numpy as np
-from scipy.special import logsumexp
+from scipy.special import softmax
 
 from bushfit.diagnosis.document import Verdict
 from bushfit.diagnosis.faulty_parts import FaultyPart, OutlierCluster, is_pattern
@@ -81,7 +81,8 @@ class Composition:
         "levels" stands for rig errors of whole levels, and "unnamed" for a smooth curve or deviation.
         """
         marks = [f"part: {part.family}" for part in self.faulty_parts] + ["levels"] * self.best.has_level_errors
-        return frozenset((*self.causes, *marks, *["unnamed"] * self.unnamed))
+        marks += [str(self.best.mistake.key)] if self.best.mistake else []
+        return frozenset((*self.names, *marks, *["unnamed"] * self.unnamed))
 
     @property
     def may_mislead(self) -> bool:
@@ -127,8 +128,7 @@ def decide_verdict(hypotheses: Sequence[Hypothesis], tolerance: float, *, gap_st
         Verdict, probability that nothing is missing, and the explanations behind the verdict.
     """
     hypotheses = [hypothesis for hypothesis in hypotheses if hypothesis.compound_deviates or not gap_stays]
-    log_posteriors = np.array([hypothesis.log_posterior for hypothesis in hypotheses])
-    weights = np.exp(log_posteriors - logsumexp(log_posteriors)).tolist()
+    weights = softmax([hypothesis.log_posterior for hypothesis in hypotheses]).tolist()
     small = [not gap_stays and (h.change <= tolerance or not h.key) for h in hypotheses]
     nothing = sum(weight for weight, is_small in zip(weights, small, strict=True) if is_small)
     triples = zip(hypotheses, weights, small, strict=True)
@@ -173,12 +173,14 @@ def _verdict_on_components(likely: Sequence[Composition], nothing: float, leads:
     if fits and (first.may_mislead or not (first.causes or first.unnamed)):
         return Finding("unexplained", nothing, reported, leads)
     curve = best.unnamed not in ("", COMPOUND) and best.last_change >= (1.0 - LEAST_NAMED_SHARE) * best.change
-    # a mistake must close the gap without effects of the rig; effects of the rubber are permitted
+    # a mistake must close the gap without effects of the rig, unless its factor is estimated; effects of the rubber are
+    # permitted
     rig_effects = any(get_effect(name).level != Level.MATERIAL for name in best.effects)
     compensated = best.mistake and (rig_effects or best.faulty_parts)
-    if not first.causes or curve or compensated or not fits:
+    is_estimated = best.mistake and best.mistake.kind.is_estimated
+    if not first.causes or curve or ((compensated or not fits) and not is_estimated):
         return Finding("described", nothing, reported, leads)
-    partly = first.unnamed or best.has_level_errors or first.faulty_parts or (best.mistake and best.effects)
+    partly = first.unnamed or best.has_level_errors or first.faulty_parts or (best.mistake and best.effects) or not fits
     return Finding("partly" if partly else "named", nothing, reported, leads, first.names)
 
 

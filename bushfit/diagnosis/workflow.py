@@ -11,7 +11,7 @@ from bushfit.caveat import Caveat
 from bushfit.diagnosis.closing import without_assumed_gain_errors
 from bushfit.diagnosis.condense import shorten_tests
 from bushfit.diagnosis.faulty_parts import outlier_clusters
-from bushfit.diagnosis.fits import EVALUATIONS
+from bushfit.diagnosis.fits import fit_model
 from bushfit.diagnosis.record import Diagnosis, DiagnosisSettings
 from bushfit.diagnosis.recording_mistakes import MistakeScreening, correct_adopted, possible_mistakes
 from bushfit.diagnosis.report_text import DiagnosisWriter
@@ -21,7 +21,6 @@ from bushfit.effects import effect_name_of, get_effect, place_suffix, qualified_
 from bushfit.effects.mistakes import get_candidate, get_mistake
 from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.errors import FitError, quote_path
-from bushfit.fitting.descent import Descent
 from bushfit.fitting.preparation import split_by_kind, with_gain_weighting
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.problem import FitProblem, FitResult
@@ -136,5 +135,4 @@ def _initial_fit(
         robust = solve_problem(FitProblem.with_fixed(model, data_sets, fixed, data.bounds), robust=True)
         outliers, data_sets = robust.outliers, robust.data_sets
     data_sets = [data_set.with_weight() for data_set in with_gain_weighting(data_sets, weigh=True)]
-    descent = Descent.start(FitProblem.with_fixed(model, data_sets, fixed, data.bounds)).run(EVALUATIONS)
-    return descent.solution, start, outliers
+    return fit_model(model, data_sets, fixed, data.bounds), start, outliers

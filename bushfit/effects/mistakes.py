@@ -55,6 +55,7 @@ class Mistake(Effect):
         swaps: True if axial and radial are interchanged.
         scales: True for a factor that is a power of 1000, which is possible only if the test as stated is implausible
             for rubber.
+        is_estimated: True if `force` is unknown, and estimated from the other tests.
     """
 
     level: Level = Level.RECORD
@@ -75,15 +76,14 @@ class Mistake(Effect):
     doubt: Callable[[Complex], bool] | None = None
     swaps: bool = False
     scales: bool = False
+    is_estimated: bool = False
 
-    def corrected_test(self, test: _Test) -> _Test | None:
-        """Correct a test for this mistake.
+    def corrected_test(self, test: _Test) -> _Test:
+        """Correct a test, or the first harmonic of a loop as a sweep of one point, in which the mistake is possible.
 
         Returns:
-            The corrected test, or None if the mistake is not possible in the test.
+            The corrected test.
         """
-        if not self.is_possible(test):
-            return None
         direction = self._direction(test.direction)
         if isinstance(test, Loop):
             motion, force = self.displacement * test.displacement, self.force * test.force
@@ -96,20 +96,6 @@ class Mistake(Effect):
             amplitude=factor * test.amplitude,
             reached=None if test.reached is None else factor * test.reached,
             stiffness=self.force / self.displacement * stiffness,
-        )
-
-    def corrected_harmonic(self, cycle: Sweep) -> Sweep:
-        """Correct the first harmonic of a loop, given as a sweep of one point, for this mistake.
-
-        Returns:
-            The corrected first harmonic, as a sweep of one point.
-        """
-        return replace(
-            cycle,
-            direction=self._direction(cycle.direction),
-            frequency=cycle.frequency / self.time,
-            amplitude=self.displacement * cycle.amplitude,
-            stiffness=self.force / self.displacement * cycle.stiffness,
         )
 
     def is_possible(self, test: Loop | Sweep) -> bool:
