@@ -40,7 +40,7 @@ COMPOUND = "compound"
 POWER_LAW = "power law"
 #: Minimum variance of a pattern of the compound's deviation relative to the largest: the patterns left out are together
 #: less than a tenth of the deviation (standard deviation) at each operating point.
-_PATTERNS = {"minimum": 3e-4}
+_MINIMUM_VARIANCE = 3e-4
 #: Fraction of the compound's deviation that changes over the shorter lengths of a smooth curve: yield and breakdown set
 #: in within a factor of 2 or 3 of the strain.
 _COMPOUND_ROUGHNESS = 0.25
@@ -80,7 +80,8 @@ def compound_signature(fit: FitResult) -> Signature | None:
     """
     if not fit.data_sets:
         return None
-    smooth = _smooth_changes(fit, fit.data_sets, COMPOUND_LENGTHS, correlate=_compound_correlation, **_PATTERNS)
+    limits: dict[str, Any] = {"minimum": _MINIMUM_VARIANCE, "correlate": _compound_correlation}
+    smooth = _smooth_changes(fit, fit.data_sets, COMPOUND_LENGTHS, **limits)
     columns, changes = map(np.concatenate, zip(smooth, _formula_changes(fit), fast_relaxation(fit), strict=True))
     for loops in group_repeats(split_by_kind(fit.data_sets)[0]):
         columns = np.concatenate((columns, _repeat_changes(fit, loops, compound_shapes)))
