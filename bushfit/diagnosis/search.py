@@ -360,8 +360,8 @@ class Search:
     def _corrected_records(self) -> Iterator[SearchState]:
         """Generate states in which one recording mistake is corrected, the most promising first."""
         possible, select = possible_mistakes(self.data, self.settings.without), MistakeScreening(self.data).best
-        known, estimated = ([m for m in possible if m.kind.is_estimated is flag] for flag in (False, True))
-        for mistake in track("mistakes corrected", [*select(known, _MISTAKES), *select(estimated, _CORRECTED)]):
+        constant, estimated = ([m for m in possible if m.kind.is_estimated is flag] for flag in (False, True))
+        for mistake in track("mistakes corrected", [*select(constant, _MISTAKES), *select(estimated, _CORRECTED)]):
             with suppress(FitError, ModelError):  # the model cannot be fitted to the corrected tests
                 log_odds = log(ODDS["record"] / len(possible))
                 state = self._corrected_record(mistake, log_odds)

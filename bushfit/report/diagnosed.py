@@ -31,14 +31,19 @@ _USES = {
 
 
 def permitted_use(document: DiagnosisFile) -> str:
-    """Sentence on what the numbers may be used for after a diagnosis (content of diagnosis.json)."""
-    if any(effect["correction"] for effect in document["effects"]):
+    """Find out what the numbers may be used for after a diagnosis (content of diagnosis.json).
+
+    Returns:
+        One or two sentences.
+    """
+    verdict, effects = document["verdict"], document["effects"]
+    if any(effect["correction"] for effect in effects):
         return "Correct the record first: the numbers are those of the uncorrected tests."
-    is_met = document["verdict"] == "unexplained" and not document["where"]
-    if is_met and "prior_contradicted" in document["warning_kinds"]:
+    if verdict == "unexplained" and not document["where"] and "prior_contradicted" in document["warning_kinds"]:
         return "Do not release these numbers: the model meets the tests, but the tests contradict a prior."
-    is_shared = document["verdict"] == "ambiguous" and not all(effect["alternatives"] for effect in document["effects"])
-    return _WITH_BANDS + " Do not state one cause of the rest yet." if is_shared else _USES[document["verdict"]]
+    if verdict == "ambiguous" and not all(effect["alternatives"] for effect in effects):
+        return f"{_WITH_BANDS} Do not state one cause of the rest yet."
+    return _USES[verdict]
 
 
 def gap_table(diagnosis: Diagnosis) -> pd.DataFrame:
