@@ -135,7 +135,7 @@ def correct_adopted(data: PreparedCampaign, names: Collection[str]) -> tuple[Pre
         The corrected campaign, and one warning for each mistake.
 
     Raises:
-        ModelError: the named mistake is not possible in this test, or the campaign has no such test.
+        ModelError: the named mistake cannot be corrected in this test, or the campaign has no such test.
     """
     messages = []
     for name in names:
@@ -146,7 +146,7 @@ def correct_adopted(data: PreparedCampaign, names: Collection[str]) -> tuple[Pre
             raise ModelError(
                 "this mistake cannot be corrected in this test",
                 found=name,
-                expected=f"one of {expected}" if expected else "another mistake: this one is corrected in no test",
+                expected=f"one of {expected}" if expected else "another mistake: no test can be corrected for this one",
             )
         sentence = f"read as if {mistake.sentence}; {mistake.corrections[0]}"
         messages.append(Caveat("corrected_record", sentence).about(f"corrected by --adopt {name}"))
