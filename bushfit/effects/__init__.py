@@ -30,7 +30,8 @@ _LINES = (Direction.AXIAL, Direction.RADIAL)
 #: first), by keyword in library.toml.
 _SOUGHT: dict[str, Callable[[Sequence[str]], Sequence[str]]] = {
     "others": lambda places: places[1:],
-    "lines": lambda places: [place for place in places if place in _LINES and len(places) > 1],
+    "lines": lambda places: [place for place in places if place in _LINES],
+    "compared lines": lambda places: [place for place in places if place in _LINES and len(places) > 1],
 }
 _TABLE: dict[str, Any] = tomllib.loads(Path(__file__).with_name("library.toml").read_text(encoding="utf-8"))
 #: Fields of an effect's record that the Python file of the effect may define.
