@@ -365,17 +365,23 @@ class Search:
             with suppress(FitError, ModelError):  # the model cannot be fitted to the corrected tests
                 log_odds = log(ODDS["record"] / len(possible))
                 state = self._corrected_record(mistake, log_odds)
-                if mistake.kind.is_estimated:  # by all parameters
+                if state and mistake.kind.is_estimated:  # by all parameters
                     state = self._corrected_record(state.refined_mistake(), log_odds)
-                if [test.size for test in state.fit.data_sets] == [test.size for test in self.base.data_sets]:
+                if state:
                     yield self._visit(state)
 
-    def _corrected_record(self, mistake: RecordingMistake, log_odds: float) -> SearchState:
+    def _corrected_record(self, mistake: RecordingMistake, log_odds: float) -> SearchState | None:
         """Fit the starting model to tests with a corrected mistake, whose prior odds have the natural log `log_odds`.
 
-        Raises: FitError or ModelError if the model cannot be fitted.
+        Returns:
+            State of the search; None if the fit leaves out other outliers than the fit to the tests as recorded.
+
+        Raises:
+            FitError, ModelError: the model cannot be fitted to the corrected tests.
         """
         fit = self.fit_corrected(mistake.corrected_campaign())
+        if [test.size for test in fit.data_sets] != [test.size for test in self.base.data_sets]:
+            return None
         log_odds -= 0.5 * (modulus_deviation(fit) ** 2 - modulus_deviation(self.base) ** 2)
         tests, change = RecordedTests.of_fit(fit, self.data.campaign.rig), record_change(self.base, fit)
         return SearchState.of_tests(replace(tests, log_odds=log_odds, mistake=mistake, change=change))
