@@ -383,6 +383,9 @@ class MeasuredLoop(MeasuredBase):
 
         The gain error is added. The model error of the first harmonic is subtracted, because a smooth error of the
         model, which the fit adds separately, contains it.
+
+        Args:
+            influence: change of each estimate per unit of each of the n whitened residuals of this loop, (k, n).
         """
         first = self.model_error * _ERROR_SIZES[0] * self.force_changes(basis(self.phase, 1).T[1:])
         both = influence @ np.vstack((first, self.gain_error * self.gain_and_offset()[0])).T

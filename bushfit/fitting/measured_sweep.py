@@ -331,6 +331,9 @@ class MeasuredSweep(MeasuredBase):
 
         If the fit assumes a model error, errors shared by runs and levels are added; the independent model error is
         subtracted, because a smooth error of the model, which the fit adds separately, contains it.
+
+        Args:
+            influence: change of each estimate per unit of each of the 2 n whitened residuals of this sweep, (k, 2 n).
         """
         whitened = self.model_errors.whiten(influence)
         added = self.run_errors.covariance(whitened) + self._level_errors(self.per_noise).covariance(whitened)
