@@ -11,11 +11,12 @@ from hypothesis import strategies as st
 from rigged import SHARED, Tamper, asked, said
 from tries import some
 
-from bushfit.diagnosis.recording_mistakes import MistakeScreening, possible_mistakes
+from bushfit.diagnosis.recording_mistakes import MistakeScreening, RecordingMistake, possible_mistakes
 from bushfit.effects.mistakes import MISTAKES
 from bushfit.errors import FitError
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.geometry import Direction
+from bushfit.model.result import Outlier
 from bushfit.reading.measurement import Loop, Sweep
 
 AXIAL = "peak_to_peak:sweep_axial"
@@ -109,10 +110,14 @@ def test_a_mistake_in_every_explanation_is_reported_before_the_rest_is_decided(m
     assert not diagnosis.has_added_effects
 
 
-def test_a_test_that_is_wrong_by_an_unknown_factor_is_named_with_the_factor(measured):
-    diagnosis = asked(on_sweeps(lambda s: replace(s, stiffness=0.4 * s.stiffness), 0)(measured(None, SHARED)))
-    assert said(diagnosis) == "named unknown_factor"
+def test_a_test_that_is_wrong_by_an_unknown_factor_is_named_with_the_factor(measured, monkeypatch):
+    campaign = on_sweeps(lambda s: replace(s, stiffness=0.4 * s.stiffness), 0)(measured(None, SHARED))
+    assert said(diagnosis := asked(campaign)) == "named unknown_factor"
     assert "of sweep_axial are 0.399 (95 % interval 0.398 to 0.400) times those of the other" in diagnosis.summary
+    # a correction after which the fit leaves out other points is not compared
+    corrected, one = RecordingMistake.corrected_campaign, Outlier("sweep_axial", None, 5, "stiffness", 9.0)
+    monkeypatch.setattr(RecordingMistake, "corrected_campaign", lambda mistake: corrected(mistake).without([one]))
+    assert not any(effect.test for effect in asked(campaign).effects)
 
 
 def test_of_the_corrections_of_the_same_tests_those_far_behind_leave_room_for_others(measured, monkeypatch):
